@@ -1,1 +1,1 @@
-"""An instrument on the bench: held positions in, lines with their deviations and doubts out."""
+"""Calibration on the bench: from held positions to lines with their deviations and doubts."""

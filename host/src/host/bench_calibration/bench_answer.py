@@ -1,4 +1,4 @@
-"""What a calibration says: lines to read, and the same as plain data."""
+"""Result of a calibration: lines for people, and the same as plain data."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _RAW = {"channel": "counts", "pulse": "us"}
 
 
 def spoken(subject: Subject, lines: Sequence[Calibrated]) -> list[str]:
-    """Return what to read of each channel: zero and slope with 95 %, what the points say."""
+    """Return lines on each channel: zero and slope with 95 % half-widths, residuals, doubts."""
     said = []
     for one in lines:
         if one.fit is not None:
@@ -83,7 +83,7 @@ def _numbers(fit: LineFit) -> dict[str, Any]:
 
 
 def spoken_iron(found: HardIron) -> list[str]:
-    """Return what to read of the magnetometer, and what to type at the IMU's console."""
+    """Return lines on the magnetometer, with the command to type at the IMU's console."""
     centre = ", ".join(
         f"{axis} {c:.0f} +- {NORMAL_95 * s:.1g}"
         for axis, c, s in zip("xyz", found.centre, found.centre_sigma, strict=True)
@@ -99,7 +99,7 @@ def spoken_iron(found: HardIron) -> list[str]:
 
 
 def spoken_supply(found: SupplyReference) -> list[str]:
-    """Return what to read of the supply, and how the board is told."""
+    """Return lines on the supply, with the command that stores the reference in the board."""
     said = [
         f"supply: the chip's reference is {found.reference_mv:.0f} +-"
         f" {NORMAL_95 * found.sigma_mv:.0f} mV (meter {found.meter_v:.3f} V where the status line"

@@ -1,4 +1,4 @@
-"""Held positions from what the logger recorded on the bench, or its radio sent."""
+"""Held positions from a log of the bench, or from a captured radio stream."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from host.physical.timebase import WRAP_US
 Array = NDArray[np.float64]
 _ANEW_US = 1_000_000
 _LEAK_S = 45.0  # the procedure holds 60 s
-_MOVES = 0.1  # of the smallest step of the positions: less in 0.3 s is no motion
-_FACE = 0.9  # of free fall
+_MOVES = 0.1  # share of the smallest step between positions: less in 0.3 s is no motion
+_FACE = 0.9  # share of gravity that an axis must read to point up or down
 _STILL_MPS2, _STILL_RADPS = 0.3, 0.05
-_WHOLE_RAD = 90.0 * RAD_PER_DEG  # a turn of less is somebody who lifted the table
+_WHOLE_RAD = 90.0 * RAD_PER_DEG  # a smaller turn comes from a moved table
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ class LogSource:
         return [self._held(raw, 1, self._nearest(held, raw, p, far), p) for p in leaks] + held
 
     def _moved(self, raw: Array) -> int:
-        """Return the column that moved: another than the one meant where it stood still."""
+        """Return the column that moved: the named channel's, or another if that stood still."""
         spans = [float(np.ptp(c[np.isfinite(c)])) if np.isfinite(c).any() else 0.0 for c in raw.T]
         own = self._subject.channels.index(self._channel)
         expected = np.ptp(self._positions) / self._subject.limits["slope"][1]

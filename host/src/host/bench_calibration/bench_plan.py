@@ -1,4 +1,4 @@
-"""What is calibrated with which tool, in which positions, within which limits: `bench.toml`."""
+"""The plan of `bench.toml`: subjects, their tools, positions and limits."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from host.near_names import like
 
 TABLE = Path(__file__).with_name("bench.toml")
 WATER_KGPM3 = 998.2  # at 20 deg C; 15 and 25 deg C differ by 0.2 %: in the column's scale
-AIR_KGPM3 = 1.225  # sea level, 15 deg C; the speed run is told better
+AIR_KGPM3 = 1.225  # sea level, 15 deg C; for a speed run the user gives the density
 
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """What a position is known by; each number one standard deviation in `setting`, see the file.
+    """A tool that sets positions; errors are one standard deviation in the unit of its setting.
 
     Attributes
     ----------
@@ -64,7 +64,8 @@ class Subject:
     Attributes
     ----------
     table : str
-        Of the calibration file: channel, pulse, imu; empty where the numbers live elsewhere.
+        Section of the calibration file: channel, pulse, imu; empty if the result is stored
+        elsewhere.
     positions : tuple
         Of one repeat, in the tool's setting; of the IMU, words.
     limits : mapping of str to (float or (float, float))
@@ -107,7 +108,7 @@ def tools() -> dict[str, Tool]:
 
 
 def hand_worth() -> float:
-    """Return how many readings a tool's stated scatter counts as."""
+    """Return the degrees of freedom with which a tool's stated scatter counts."""
     return float(_document()["hand"]["worth"])
 
 

@@ -1,4 +1,4 @@
-"""One calibration from its sources to its file: read, fit, doubt, write, draw, say."""
+"""One calibration from its sources to its file: read, fit, check, write, draw, report."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _RECORDED = ("accelerometers", "gyros")  # over USB: in any order, found in what
 
 @dataclass(frozen=True, slots=True)
 class Bench:
-    """What a user wants calibrated.
+    """Request of a calibration.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Bench:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What came of it: lines to read, plain data, files, the exit code."""
+    """Result of a calibration: lines for people, plain data, files, the exit code."""
 
     lines: tuple[str, ...]
     data: dict[str, Any]
@@ -157,7 +157,7 @@ def _lines(
     say: Callable[[str], None],
     show: Callable[[str], None] | None,
 ) -> tuple[float | None, list[Calibrated], list[str]]:
-    """Return temperature, lines and what is wrong beside them."""
+    """Return temperature, lines, and further faults in words."""
     logs = {p: BenchLog.read(p) for p in bench.sources if _is_log(p)}
     warm = [t for log in logs.values() if (t := log.temperature_degc()) is not None]
     temperature = float(np.mean(warm)) if warm else None

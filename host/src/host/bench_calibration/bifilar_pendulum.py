@@ -43,7 +43,7 @@ def inertia(
     Parameters
     ----------
     subject : Subject
-        Its limits are what tape and air leave open.
+        Its limits are the errors by tape measure and entrained air.
     mass_kg, mass_sigma_kg : float
         What hangs, and one standard deviation of the scale.
     numbers : sequence of float

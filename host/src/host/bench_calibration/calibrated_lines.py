@@ -23,7 +23,7 @@ class Calibrated:
     doubt : str or None
         What is wrong with it; such a line is not written.
     short : str
-        What is missing of the plan; empty: nothing.
+        What the plan wants and the points lack; empty if they are complete.
     """
 
     channel: str
@@ -66,7 +66,7 @@ _LEAK_S = 45.0  # the procedure holds 60 s
 
 
 def _short(subject: Subject, points: Sequence[Held], fit: LineFit) -> str:
-    """Return what a calibration lacks: repeats, or one of the directions."""
+    """Return in words that repeats or a direction are missing; empty if nothing is."""
     repeats = len({p.repeat for p in points})
     lacking = []
     if repeats < subject.repeats:

@@ -1,4 +1,4 @@
-"""Two calibration files, line by line: what moved by more than its deviations."""
+"""Compare two calibration files line by line: numbers that moved by more than their deviations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The dated calibration file: lines that were measured now, beside those it had before."""
+"""Write the dated calibration file: new lines replace their old ones, the rest stays."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ IMU = {"accelerometers": "accel", "gyros": "gyro"}
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """Who calibrated what, when, with what.
+    """Particulars of a calibration: person, serials, temperature.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
-"""What is wrong with a channel, in one sentence that names the cause; the first that explains it.
+"""The fault of a channel, in one sentence: the first cause that explains its points.
 
-A limit of `bench.toml` must be passed, and what is seen must be beyond what hand and tool do: six
-standard deviations, so that of 19 lines of a healthy instrument none is accused by chance.
+A fault must exceed a limit of `bench.toml` and six standard deviations of hand and tool, so that
+chance accuses none of the 19 lines of a healthy instrument.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from host.bench_calibration.line_fit import LineFit
 
 Array = NDArray[np.float64]
 BEYOND = 6.0  # standard deviations
-_STILL = 0.2  # of the range that is expected: the channel does not follow
+_STILL = 0.2  # share of the expected range below which a channel does not follow
 _RESPONSE_SHARE = 0.5
 _LONG_HOLD_S = 20.0
 _LEAST_POSITIONS = 5
@@ -135,7 +135,7 @@ def _spot(subject: Subject, fit: LineFit, points: Sequence[Held]) -> str | None:
         here = fit.position == place
         rest = ~here
         beside = fit.straightened - _line_through(fit.value, fit.straightened, rest)
-        # Of a repeat's placing nothing is left in the mean over all repeats.
+        # In the mean over all repeats their placings cancel.
         middle = float(np.median(beside[rest]))
         scatter = _MAD_TO_SIGMA * float(np.median(np.abs(beside[rest] - middle)))
         distance = abs(float(beside[here].mean()) - middle)

@@ -1,7 +1,7 @@
-"""The magnetometer's hard iron: the centre of what it reads in all attitudes.
+"""The magnetometer's hard iron: the centre of its readings in all attitudes.
 
-An ellipsoid whose axes are those of the sensor, by least squares. The IMU keeps the three counts
-in its own record (`imu iron`): no line of a calibration file has them.
+The readings are fitted by an ellipsoid along the sensor's axes. The IMU stores the three counts
+itself (`imu iron`); a calibration file does not have them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from host.errors import UsageError
 
 Array = NDArray[np.float64]
 _LEAST = 30  # readings
-_COVERS = 0.5  # of the radius, to either side of the centre, on each axis
+_COVERS = 0.5  # share of the radius that readings must reach on both sides of each axis
 
 
 @dataclass(frozen=True, slots=True)

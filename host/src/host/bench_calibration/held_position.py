@@ -1,4 +1,4 @@
-"""One held position: where it was, what every channel read there. All sources give these."""
+"""One held position and the readings of every channel there; every source returns these."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Protocol
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """What was read while a position was held.
+    """Readings while a position was held.
 
     Attributes
     ----------

@@ -1,8 +1,8 @@
 """The line or curve through held positions, and one standard deviation of its zero and its slope.
 
 In each repeat the tool is put on anew, so that each has its own zero; slope and hysteresis are
-common. Scatter is what the readings show together with what the tool's file says of it. What a
-repeat cannot show (the tool itself, its scale) is added.
+common. Scatter is estimated from the readings and the tool's stated scatter together. Errors that
+repeats cannot show (the tool itself, its scale) are added.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _BEYOND_DOUBT = 20.0  # Fisher's F of a curve against a line: chance gives it on
 
 @dataclass(frozen=True, slots=True)
 class LineFit:
-    """v = (raw - zero) * slope, value = v or its curve, with what the points say of it.
+    """The fitted line, v = (raw - zero) * slope, or its curve, with residuals and deviations.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class LineFit:
 
     @property
     def straightened(self) -> Array:
-        """What was read, without the curve's bow."""
+        """Readings with the bow of the curve removed."""
         return np.asarray(self.raw - self.fitted + self.zero + self.value / self.slope)
 
 
@@ -181,7 +181,7 @@ def fit_line(
 
 @dataclass(frozen=True, slots=True)
 class _Expected:
-    """What a tool's file says of the readings, in raw units, and what they say themselves."""
+    """Scatter and placing of the readings, in raw units: stated by the tool's file, and as seen."""
 
     tool: Tool
     gradient: float
@@ -248,7 +248,7 @@ def _bowed(value: Array, raw: Array, design: Array, many: int) -> tuple[float, A
 
 
 def _is_curve(subject: Subject, bend: float, raw: Array, design: Array, bowed: Array) -> bool:
-    """Return whether a bend is large, beyond doubt, and all that is wrong with the line."""
+    """Return whether a bend is large and significant, and leaves no other residual."""
     straight, curved = (_squares(d, raw) for d in (design, bowed))
     free = len(raw) - bowed.shape[1]
     if free <= 0 or not bend > subject.limits.get("bend", math.inf):

@@ -1,4 +1,4 @@
-"""The accelerometer on six faces: held positions at plus and minus free fall, and how crooked."""
+"""The accelerometer on six faces: held positions at plus and minus gravity, mounting angle."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def crooked_deg(held: Sequence[Held], lines: Sequence[Calibrated]) -> float:
 
 
 def crooked_doubt(subject: Subject, angle_deg: float) -> str | None:
-    """Return the sentence for an IMU that sits crooked on its cube."""
+    """Return the doubt about an IMU whose axes are tilted on its cube; None within the limit."""
     limit = subject.limits["crooked_deg"]
     if angle_deg <= limit:
         return None

@@ -1,4 +1,4 @@
-"""The chip's reference from a voltmeter beside what the status line says of the supply."""
+"""The chip's voltage reference, from pairs of voltmeter and status line."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import numpy as np
 from host.bench_calibration.bench_plan import Subject, meter_share
 from host.errors import UsageError
 
-NOMINAL_MV = 1100.0  # what the status line counts with until it is told better
+NOMINAL_MV = 1100.0  # reference that the status line assumes until one is stored
 
 
 @dataclass(frozen=True, slots=True)
 class SupplyReference:
-    """The reference of one chip, mV, its deviation, and means of what it was found from, V."""
+    """The reference of one chip and its deviation (mV), with the mean voltages behind it (V)."""
 
     reference_mv: float
     sigma_mv: float

@@ -1,7 +1,7 @@
 """Gyros: zero at rest, slope from a turn by a known angle.
 
-A turn's mean rate times its time is the angle, whatever the hand's speed. The zero of the rests
-goes off first; of two opposite turns what is left of it goes too.
+A turn's mean rate times its time is the angle, whatever the hand's speed. The zero of the rests is
+subtracted first; the mean of two opposite turns removes the remainder.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from host.files.user_text import shown
 
 Array = NDArray[np.float64]
 RATES = ("p", "q", "r")
-_RESPONSE_SHARE = 0.5  # of the angle: less is another axis
+_RESPONSE_SHARE = 0.5  # share of the angle that the named axis must see
 _OPPOSITE = -0.5
 
 

@@ -1,4 +1,4 @@
-"""What ends a run of a fleet, in one line."""
+"""The error that ends a run of a fleet, in one line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is asked of one flight, as plain values that go from process to process."""
+"""The task of identifying one flight, as plain values that go from process to process."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 IDENTIFY = "host.fleet.tasks.flight_identification:flight_row"
-ROWS = 4  # raised where a row says something else than before: such flights are done again
+ROWS = 4  # version of a row; raised when its content changes, so that flights are done again
 DEFAULT_MODELS = ("coefficients",)  # of a flight without vanes its linear models
 IDENTIFIED, SET_ASIDE = "identified", "set aside"
 
@@ -22,7 +22,7 @@ class FlightTask:
     source : str
         Path, or an address that fsspec reads.
     log_id : str
-        Hash of the log, or what its store says in place of one.
+        Hash of the log, or of an address the identifier that its store gives instead.
     type, aircraft : str
         Whose flight it is.
     aircraft_file : str
@@ -35,7 +35,7 @@ class FlightTask:
     accept : tuple of str
         As of `host identify`.
     date : str
-        ``2026-11-23``, or empty where the log shall say it.
+        ``2026-11-23``, or empty if the date is to come from the log.
     version : str
         Of this package and of its rows.
     """
@@ -62,16 +62,16 @@ class FlightTask:
 
 @dataclass(frozen=True, slots=True)
 class TaskLimits:
-    """What one flight may take before it is set aside.
+    """Limits beyond which a flight is set aside.
 
     Attributes
     ----------
     processor_s : float
-        Processor time. On a busy computer the clock says nothing of a flight.
+        Processor time, which a busy computer does not change.
     memory_mb : float
         Resident memory.
     waiting_s : float
-        Time by the clock: for what hangs without working.
+        Time by the clock, for a flight that hangs without using the processor.
     """
 
     processor_s: float = 300.0

@@ -1,4 +1,4 @@
-"""What every check is: waiting, seen, or failed with its reason."""
+"""The base of all checks: each waits, has passed, or has failed with its reason."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ class Check:
     asked : bool
         True where a motion is asked for: one such item at a time. Others watch all the time.
     latched : bool
-        True where rows are of no interest any more once it is green.
+        True if a passed check ignores further rows.
     state : State
     reason : str
-        Why it failed; while it waits, what it has seen so far.
+        Why it failed; while it waits, the progress so far.
     values : dict of str to float
         For the sheet; names end in their unit.
     """
@@ -53,7 +53,7 @@ class Check:
         self.values: dict[str, float] = {}
 
     def begin(self) -> None:
-        """Forget what was seen: the pilot does it (again) now."""
+        """Reset the check: the pilot does the motion (again) now."""
         self.state, self.reason, self.values = State.WAITING, "", {}
 
     def take(self, sample: Sample) -> None:

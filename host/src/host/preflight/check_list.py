@@ -1,4 +1,4 @@
-"""Which checks an aircraft and its settings ask for, in the order of the walk round it."""
+"""The checks for an aircraft and its settings, in the order of the walk round it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ PARTS = {
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What a list is made of.
+    """What the list of checks depends on.
 
     Attributes
     ----------

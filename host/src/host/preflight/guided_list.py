@@ -1,4 +1,4 @@
-"""The preflight: all checks fed with one stream, one motion asked for at a time, GO or why not."""
+"""The preflight: one stream feeds all checks, one motion at a time is asked for, then GO or not."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from host.preflight.check_list import Wanted, check_list
 from host.preflight.load_checks import RadioCheck
 from host.preflight.sample import Sample, SlowReading, in_order
 
-_HINT_S = 8.0  # of a motion that is not seen, until it is said what was seen
-_REST_S = 1.0  # behind a motion that failed before its end, until the next is looked for
+_HINT_S = 8.0  # time without success after which the pilot is told the progress so far
+_REST_S = 1.0  # pause after a motion that failed early, before the next one is looked for
 STILL = ("imu", "gyros", "airspeed_rest")  # before anything is asked to move
 
 
@@ -107,7 +107,7 @@ class Preflight:
         self._go_on()
 
     def pass_on(self) -> None:
-        """Leave the motion that is asked for as it is: red, with what was seen of it."""
+        """Skip the motion that is asked for: it stays red, with its progress so far."""
         if self.asked is not None and self.asked.state == State.WAITING:
             self.asked.failed(self.asked.missing())
             self._changed(self.asked)
@@ -131,7 +131,7 @@ class Preflight:
         return False
 
     def end(self) -> None:
-        """Judge as it stands: what was not seen is not seen."""
+        """End the list now: items not passed so far count as not passed."""
         for check in self.checks:
             if check.state == State.WAITING:
                 check.failed(check.missing() if check is self.asked or not check.asked

@@ -1,4 +1,4 @@
-"""What is judged over some seconds of use: supply under servo load, radio at range."""
+"""Checks over some seconds of use: supply under servo load, radio at range."""
 
 from __future__ import annotations
 

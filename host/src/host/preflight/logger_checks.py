@@ -1,4 +1,4 @@
-"""The logger itself: whose settings, no reset; receiver, card."""
+"""Checks of the logger itself: settings, resets, receiver, card."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ RECEIVER = ("aileron", "elevator", "rudder", "throttle", "switch")
 
 
 class LoggerCheck(Check):
-    """Its settings are heard, name this aircraft, and it does not reset itself.
+    """The logger sends settings that name this aircraft, and does not reset itself.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ class ReceiverCheck(Check):
 
 
 class CardCheck(Check):
-    """A file is ready on the card; over USB the status line says why not."""
+    """A file is ready on the card; if not, the status line over USB gives the reason."""
 
     def __init__(self) -> None:
         super().__init__("card", "card ready", "nothing: card in, it is looked at by itself")
@@ -146,7 +146,7 @@ class CardCheck(Check):
         self._status = ""
 
     def hear(self, reading: SlowReading) -> None:
-        """Take what the logger says of its card."""
+        """Take the logger's frames about its card."""
         if reading.name == "status":
             self._status = reading.said["card"]
         elif reading.name == "event" and reading.said["code"] in ("card removed", "card error"):

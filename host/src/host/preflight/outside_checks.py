@@ -1,4 +1,4 @@
-"""What comes from outside: GPS, static pressure."""
+"""Checks of GPS and static pressure."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from host.preflight.sample import Sample, SlowReading
 
 
 class GpsCheck(Check):
-    """A fresh three-dimensional fix of an aircraft that stands.
+    """GPS gives a fresh three-dimensional fix, at rest.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class GpsCheck(Check):
 
 
 class BaroCheck(Check):
-    """Static pressure is fresh, possible, and has its noise."""
+    """Static pressure is fresh, within the possible range, and noisy as a live sensor is."""
 
     def __init__(self) -> None:
         super().__init__("baro", "barometer", "nothing")

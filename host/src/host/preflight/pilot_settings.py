@@ -1,4 +1,4 @@
-"""What of the logger's settings the checks need: as heard, before that as this host knows them."""
+"""Settings of the logger that the checks need: as received, before that those of this host."""
 
 from __future__ import annotations
 

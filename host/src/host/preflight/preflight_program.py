@@ -1,4 +1,4 @@
-"""What `host preflight` does: `host live` with a list; sheet, events, the pilot's keys."""
+"""`host preflight`: `host live` with the list of checks, its sheet, and the pilot's keys."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from host.preflight.preflight_sheet import SUFFIX, sheet_document, write_sheet
 from host.terminal import command_line
 
 SIMULATED = "sim:"
-PRACTISED = "ultrastick25e"  # of a virtual walk where no aircraft is named
+PRACTISED = "ultrastick25e"  # aircraft of a virtual walk if none is named
 
 
 @dataclass(slots=True)
 class PreflightRequest:
-    """What was asked for on the command line.
+    """Arguments of the command line.
 
     Attributes
     ----------
@@ -54,14 +54,14 @@ class PreflightRequest:
 
 @dataclass(slots=True)
 class PreflightSummary:
-    """What came of it."""
+    """Result of a preflight, with the files written."""
 
     go: bool
     sheet: Path
     live: LiveSummary
 
     def lines(self, *, page: bool) -> list[str]:
-        """Return what is on disk and what comes next; behind the page a flight may be in it."""
+        """Return lines on files and the next step; with a page the capture may hold a flight."""
         lines = self.live.lines()
         if page or not self.go:
             return lines if page else lines[:1]
@@ -129,7 +129,7 @@ class _Walk:
         session.note("preflight_begin", aircraft=wanted.aircraft.name, by=request.by)
 
     def listen(self, keys: Callable[[], str]) -> None:
-        """Turn lines that are typed into what a page asks."""
+        """Turn typed lines into the same requests as a page sends."""
         while line := keys():
             words = line.split()
             if not words:

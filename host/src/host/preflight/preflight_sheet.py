@@ -1,4 +1,4 @@
-"""The sheet of a preflight: who, when, values, GO or why not; as TOML, and read again."""
+"""Write and read the sheet of a preflight (TOML): who, when, values, GO or the reasons against."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _DIGITS = 4
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """What a sheet says, for others.
+    """The result on a sheet.
 
     Attributes
     ----------
     go : bool
     aircraft, by, date : str
     reasons : dict of str to str
-        Of what was not green.
+        By item that was not green.
     """
 
     go: bool
@@ -156,7 +156,7 @@ def read_sheet(path: Path) -> Sheet:
 
 
 def shown_sheet(path: Path) -> Join:
-    """Return what shows a sheet's GO in a session, and notes it in the capture.
+    """Return a function that shows a sheet's GO in a live session and notes it in the capture.
 
     Raises
     ------

@@ -36,7 +36,7 @@ class RelayCheck(AskedCheck):
         self._phase = 0  # 0 at rest, 1 at Mega, 2 back
 
     def hear(self, reading: SlowReading) -> None:
-        """Take who drives, and what became of the relay."""
+        """Take the frames that say who drives the servos and whether the relay follows."""
         if reading.name == "system":
             self._drive = reading.said["drive"]
         elif reading.name == "event" and reading.said["code"] == "relay lost":

@@ -1,4 +1,4 @@
-"""What a check is fed: rows of the stream one by one, slower frames in between, in their order."""
+"""The input of a check: rows of the stream and slower frames, in order of time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is judged while nobody touches the aircraft: IMU, gyros' zero, pitots at rest."""
+"""Checks while nobody touches the aircraft: IMU, gyros' zero, pitots at rest."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _LEVEL = "aircraft still and level, hands off"
 
 
 class ImuCheck(Check):
-    """The IMU is alive, still, level, and feels one g; later only that it stays alive."""
+    """The IMU is alive, still and level and measures one g; later it must only stay alive."""
 
     limits_of = "imu"
 
@@ -29,7 +29,7 @@ class ImuCheck(Check):
         self._last: tuple[float, ...] | None = None
         self._changed_s = self._valid_s = -1.0
         self._first_s: float | None = None
-        self._odd = ""  # what no later value heals
+        self._odd = ""  # a fault that stands whatever comes later
         self._link = ""  # what is wrong with its packets
         self._packets: deque[tuple[float, int, int]] = deque(maxlen=10)
 
@@ -158,7 +158,7 @@ class GyroZeroCheck(Check):
 
 
 class RestPressureCheck(Check):
-    """Both pitots read nothing while nothing blows."""
+    """Both pitots read zero in still air."""
 
     latched = True
     limits_of = "pitots"

@@ -34,7 +34,7 @@ POT_NAMES = {
 
 
 class Throw:
-    """The way of one column: which side first, least, most."""
+    """Travel of one column from its rest: which side came first, least and largest value."""
 
     def __init__(self, moved: float) -> None:
         self.moved = moved
@@ -165,7 +165,7 @@ class SurfaceCheck(AskedCheck):
             self._travel(own)
 
     def _pot_fault(self) -> str:
-        """Say which pot is dead, another's, or turned against its stick."""
+        """Return which pot is dead, swapped with another, or against its stick; empty if none."""
         own = self._sticks[self._surface]
         sense = own.first if self._slope > 0.0 else -own.first
         for name, sign in self._columns.items():

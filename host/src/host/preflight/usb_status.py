@@ -1,4 +1,4 @@
-"""The status line of the USB line as the frames that the radio would have sent."""
+"""Turn the status line of USB into the readings that the radio's frames would give."""
 
 from __future__ import annotations
 

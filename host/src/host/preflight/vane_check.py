@@ -1,4 +1,4 @@
-"""A vane lifted to both stops: direction, travel, middle; another one that moves in its place."""
+"""Check of a vane lifted to both stops: direction, travel, middle, no other vane moving."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When an aircraft flew, as far as a log of an autopilot shows it."""
+"""Time that an aircraft was in the air, from a log of an autopilot."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LEAST_S = 3.0  # of flight: a gust on the pitot is shorter
 
 @dataclass(frozen=True, slots=True)
 class Airborne:
-    """Time in the air, s; the fastest seen by what showed it, m/s; and the words for these."""
+    """Time in the air (s), the highest speed (m/s) with its source, and both in words."""
 
     time_s: float
     fastest_mps: float

@@ -32,7 +32,7 @@ SURFACE_FUNCTIONS = {
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
-    """Surfaces as shares of their full travel, in our signs, and how each is made.
+    """Surfaces as shares of their full travel, in our signs, with the outputs behind each.
 
     `shares` has ``elevator``, ``aileron``, ``rudder`` (-1 to 1), ``throttle`` (0 to 1) and what
     else moves; `made_of` the outputs behind each; `clipped` at how many samples one stood at the
@@ -81,7 +81,7 @@ def surfaces(pulses_us: Mapping[int, Array], parameters: Mapping[str, float]) ->
 def _demand(
     pulse: Array, number: int, parameters: Mapping[str, float], *, ranged: bool
 ) -> tuple[Array, int]:
-    """Return what a function asked for, as a share, and how often it stood at an end."""
+    """Return the demand of a servo function as a share, and how many samples stood at an end."""
     low, high, trim, turned = (
         parameters.get(f"SERVO{number}_{key}", DEFAULTS[key])
         for key in ("MIN", "MAX", "TRIM", "REVERSED")
@@ -102,7 +102,7 @@ def _demand(
 def _combined(
     demand: Mapping[int, Array], made: Mapping[int, str], clipped: Mapping[int, int]
 ) -> Outputs:
-    """Return surfaces, trailing edge down and left positive, from what functions asked for."""
+    """Return surfaces, trailing edge down and left positive, from demands by function."""
     shares: dict[str, Array] = {}
     made_of: dict[str, str] = {}
     ends: dict[str, int] = {}

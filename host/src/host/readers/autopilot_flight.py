@@ -1,4 +1,4 @@
-"""A log of an autopilot as one thing: columns in our names, what is lost, what it is good for."""
+"""An autopilot's log: channels in our names, losses, and whether it serves identification."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class AutopilotFlight:
         return result
 
     def notes(self) -> list[str]:
-        """Return what was chosen, how outputs became surfaces, and what is damaged."""
+        """Return lines on chosen sensors, on outputs that became surfaces, and on damage."""
         log = self.log
         said = [f"damaged: {one}" for one in log.damage]
         said.append("; ".join(self.judgement.lines[:1]))

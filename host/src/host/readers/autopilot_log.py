@@ -1,4 +1,4 @@
-"""What a log of an autopilot holds, whatever its format: messages by name, parameters, damage."""
+"""Contents of an autopilot's log in any format: messages by name, parameters, damage."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class SensorChoiceError(UsageError):
 
 
 class NothingToIdentifyError(CheckError):
-    """A log of which nothing can be identified: no fixed wing, or it never flew."""
+    """A log from which nothing can be identified: no fixed wing, or it never flew."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ class AutopilotLog:
         By name and instance.
     parameters : mapping of str to float
     damage : tuple of str
-        What is lost, wrong or unproven, a sentence each.
+        A sentence for each loss, error or unproven range.
     lost : int
         Ranges of the file that were lost.
     """

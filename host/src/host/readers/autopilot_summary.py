@@ -1,4 +1,4 @@
-"""What is said of a log of another autopilot, and what its table says of itself."""
+"""Summary of an autopilot's log, and the metadata of its table."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """ArduPilot DataFlash .bin by numpy, from its own descriptions of records.
 
 Records follow each other without a gap. A record counts only if it ends where another begins, or
-the file: of damaged logs the record before the damage is left out with it, for nothing proves its
-bytes. pymavlink hands it on (tests: oracle on whole logs).
+the file. In a damaged log the record before the damage is left out too, for nothing proves its
+bytes; pymavlink returns it. On whole logs tests compare with pymavlink.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Kind:
 
 @dataclass(frozen=True, slots=True)
 class BinaryRecords:
-    """Where the records of a log are, and what of it is none.
+    """Places of a log's records, and ranges without any.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ def read_records(path: Path, progress: Progress | None = None) -> BinaryRecords:
 def _those(
     kept: NDArray[np.bool_], starts: IntArray, number: NDArray[np.uint8], length: NDArray[np.uint8]
 ) -> tuple[IntArray, NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return what is kept of three arrays, themselves where that is all: a log has a gigabyte."""
+    """Return the kept elements of three arrays, without a copy if all are kept."""
     if kept.all():
         return starts, number, length
     return starts[kept], number[kept], length[kept]

@@ -1,4 +1,4 @@
-"""What the autopilot flew by itself for identification or tuning: chirps, autotune, doublets.
+"""Tests that the autopilot flew by itself: identification chirps, autotune, doublets.
 
 ArduPilot: SIDD (a system-identification chirp), ATRP and mode AUTOTUNE (a plane tunes an axis with
 steps of the stick or its own), texts of scripts that name a doublet. PX4:
@@ -17,12 +17,12 @@ from host.readers.autopilot_log import AutopilotLog
 PLANE_AUTOTUNE = 8  # ArduPlane mode number
 GAP_S = 2.0  # of messages of a test that go on
 SHORTEST_S = 0.5
-DOUBLET_S = 5.0  # what a text about a doublet stands for
+DOUBLET_S = 5.0  # assumed length of a doublet that only a text names
 
 
 @dataclass(frozen=True, slots=True)
 class FlownTest:
-    """A span of flight that the autopilot flew as a test, and what says so."""
+    """A span of flight that the autopilot flew as a test, and the message that names it."""
 
     name: str
     from_s: float

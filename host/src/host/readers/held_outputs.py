@@ -1,4 +1,4 @@
-"""What an output was between two of its records: a servo keeps its last pulse until the next.
+"""Servo outputs between two of their records: a servo keeps its last pulse until the next.
 
 Of outputs that are logged less often than they change, the pulses between are drawn on the cubic
 through four records, each standing until the next one: a step between two records is then where it

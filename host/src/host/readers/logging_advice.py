@@ -1,4 +1,4 @@
-"""Which parameter of the autopilot to change so that the next flight can be identified.
+"""Parameters of the autopilot to change so that the next flight can be identified.
 
 PX4: src/modules/logger/logged_topics.cpp gives each profile's topics and intervals. ArduPilot:
 ArduPlane Plane.cpp and Log.cpp, and the bits of LOG_BITMASK in defines.h.

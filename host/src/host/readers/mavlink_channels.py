@@ -1,4 +1,4 @@
-"""MAVLink messages in our names, units and signs: what a ground station saw of a vehicle.
+"""MAVLink messages of a ground station in our names, units and signs.
 
 common.xml gives the units; accelerations of RAW_IMU and SCALED_IMU are thousandths of g, rates
 thousandths of rad/s, as ArduPilot fills them.

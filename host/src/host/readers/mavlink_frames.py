@@ -1,8 +1,8 @@
 """The frames of a telemetry log, found and proven in portions.
 
 Each frame stands behind the ground station's time (8 bytes, us, most significant first). A frame of
-a wanted kind counts only if its checksum is right; of one that is wrong nothing is believed, its
-length neither, so the search goes on one byte further until it meets a frame that was found before.
+a wanted kind counts only if its checksum is right. Nothing of a wrong one is trusted, not even its
+length, so the search goes on one byte further until it meets a frame that was found before.
 """
 
 from __future__ import annotations
@@ -137,7 +137,8 @@ def _around_wrong(
                 return kept, wrong, at
             end = at + STAMP_BYTES + length
             wanted = length and int(_heads(view, np.array([at]))[1][0]) in extras
-            # What nothing proves, a kind that is not read, counts where the next frame follows it.
+            # A frame of a kind that is not read has no proof; it counts where the next frame
+            # follows it.
             behind = walked[bisect(walked, at)] if at < walked[-1] else len(data)
             if length and (_right(view, np.array([at]), extras)[0] if wanted else end == behind):
                 kept.append(at)

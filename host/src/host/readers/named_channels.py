@@ -1,4 +1,4 @@
-"""What a log of an autopilot says in our names: signals, which surfaces are shares, and remarks."""
+"""Channels of an autopilot's log under our names: signals, which surfaces are shares, remarks."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from host.arrays import Array
 from host.readers.autopilot_log import AutopilotLog, Messages, SensorChoiceError
 from host.readers.signals import Signal
 
-STANDARD_DENSITY_KGPM3 = 1.225  # ICAO standard atmosphere at sea level: what airspeed is read at
+STANDARD_DENSITY_KGPM3 = 1.225  # ICAO, sea level: the density for which indicated airspeed is true
 STANDARD_TEMPERATURE_DEGC = 15.0
-# What no aircraft of this size does; a bit changed in a record that still fits.
+# Limits that no aircraft of this size exceeds; a value beyond comes from a changed bit.
 RANGES = {
     "p_radps": 40.0, "q_radps": 40.0, "r_radps": 40.0,
     "ax_mps2": 320.0, "ay_mps2": 320.0, "az_mps2": 320.0,
@@ -37,7 +37,7 @@ class Channels:
     signals : dict of str to Signal
         By our name with unit; surfaces without ``_rad``: they are shares of full travel.
     notes : list of str
-        What was chosen, and how outputs became surfaces.
+        Lines on chosen sensors and on outputs that became surfaces.
     clipped : dict of str to int
         Of a surface or an IMU, samples at the end of its range.
     output_period_s : float
@@ -63,7 +63,7 @@ class Channels:
         return np.asarray(np.sqrt(STANDARD_DENSITY_KGPM3 / here))
 
     def add(self, name: str, t_s: Array, values: Array, source: str, late_s: float = 0.0) -> None:
-        """Add a channel; values that cannot be are missing, and said."""
+        """Add a channel; impossible values count as missing, with a remark."""
         # What the log has in single precision stays so: of a gigabyte twice is too much.
         clean = values if values.dtype == np.float32 else numbers(values)
         limit = RANGES.get(name, np.inf)

@@ -1,4 +1,4 @@
-"""Which records have a time that can be: near that of their neighbours, never backwards."""
+"""Find records with a possible time: near that of their neighbours, never backwards."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ EARLIEST_S, LONGEST_S = -60.0, 30 * 86400.0  # of a time since boot
 def plausible_times(t_s: Array) -> tuple[BoolArray, int]:
     """Return which of the times (n,) are possible, and how many are not.
 
-    A time far from the median of the five around it was changed: a pause in the log is none, for
-    the median lies on the record's own side of it. What then still steps back is left out too.
+    A time far from the median of the five around it is wrong. A pause in the log is no error,
+    since the median lies on the record's own side of it. Times that still step back are left out
+    too.
     """
     steps = np.diff(t_s)
     if len(t_s) > 1 and t_s[0] > EARLIEST_S and t_s[-1] < LONGEST_S:

@@ -1,4 +1,4 @@
-"""PX4's pulses back to what its surfaces were asked for, by PWM_MAIN_ and PWM_AUX_ parameters.
+"""PX4's pulses converted back to surface demands, by PWM_MAIN_ and PWM_AUX_ parameters.
 
 A pin whose FUNC is 200 + k carries surface k. Its pulse is linear between MIN and MAX, by way of
 CENT where that is set (v1.16 on); a bit of REV turns it (src/lib/mixer_module).

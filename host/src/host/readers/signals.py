@@ -22,7 +22,7 @@ class Signal:
     source : str
         Message, instance and field.
     late_s : float
-        How late it is by the autopilot's own filters, nominally; told, not taken out.
+        Nominal delay (s) by the autopilot's own filters; reported, not removed.
     """
 
     t_s: Array

@@ -1,1 +1,1 @@
-"""What is shown of a flight after landing: a page, pictures, a report."""
+"""Pages made after landing: the flight's page, pictures, the report."""

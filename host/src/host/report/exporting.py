@@ -1,4 +1,4 @@
-"""From a request to a file of another program: what `host export` does."""
+"""`host export`: write a flight as a file for another program."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ def page_text(name: str) -> str:
 
 
 def page_script() -> str:
-    """Return our own modules as one program that leaves no name behind."""
+    """Return our own modules as one script without global names."""
     own = "\n".join(page_text(f"{name}.js") for name in _MODULES)
     return f"\n(() => {{\n'use strict';\n{own}\n}})();\n"
 
@@ -206,7 +206,7 @@ def _jumps(flight: ShownFlight) -> str:
 
 
 def _untimed(summary: Mapping[str, Any]) -> list[str]:
-    """Return the losses of which nobody knows when they happened."""
+    """Return the losses whose time is unknown."""
     return [one["text"] for one in summary["losses"]["ranges"] if one.get("t_s") is None]
 
 

@@ -233,7 +233,7 @@ def _found_in(path: Path, wanted: Wanted) -> tuple[Maneuvers, list[str]]:
 
 
 def _no_maneuvers(why: str, path: Path) -> str:
-    """Return why there are none, without the folder: a page is mailed."""
+    """Return why no maneuvers were found, without the folder's name, as a page is mailed."""
     return f"no maneuvers: {shown(why.removeprefix(f'{path}: '))}"
 
 

@@ -1,4 +1,4 @@
-"""What a report says of the flight itself: health of the data, maneuvers, sensors, calibration."""
+"""Sections of a report about the flight: health of the data, maneuvers, sensors, calibration."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from host.report.shown_flight import ShownFlight, quality
 
 
 def data_health(flights: list[ShownFlight], sources: list[str]) -> str:
-    """Return what `host decode` says of each log; of other sources that they are none."""
+    """Return the summary of `host decode` for each log, and a remark for each other source."""
     shown = {flight.name for flight in flights}
     parts = [
         f"<h3>{escaped(flight.name)}</h3><pre>{escaped_lines(flight.lines)}</pre>"
@@ -65,7 +65,7 @@ def _use(item: Any, answers: list[dict[str, Any]]) -> str:
 
 
 def sensor_agreement(numbers: JsonNumbers) -> str:
-    """Return what the flight tells of its sensors: errors found, residuals, doubts."""
+    """Return the data-compatibility check: sensor errors found, residuals, doubts."""
     found = numbers.document["data_compatibility"]
     many = isinstance(found, list)
     parts = []

@@ -1,4 +1,4 @@
-"""A flight as a ground station had recorded it: MAVLink messages with times (.tlog)."""
+"""A flight as a telemetry log of a ground station: MAVLink messages with times (.tlog)."""
 
 from __future__ import annotations
 

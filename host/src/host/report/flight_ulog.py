@@ -75,7 +75,7 @@ def _information(flight: ShownFlight, calibration: dict[str, Any]) -> dict[str, 
 
 
 def _px4_topics(columns: dict[str, Array], timestamp: NDArray[np.uint64]) -> list[Topic]:
-    """Return what PX4's tools look for, of the rows that have it."""
+    """Return the topics that PX4's tools look for, from the rows that have values."""
     made = []
     if {*_RATES, *_FORCES} <= columns.keys():
         rates = np.column_stack([columns[name] for name in _RATES])

@@ -15,7 +15,7 @@ from host.report.html_text import escaped
 
 @dataclass(frozen=True, slots=True)
 class HtmlPage:
-    """What a page is made of.
+    """The parts of a page.
 
     Attributes
     ----------

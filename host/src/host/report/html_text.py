@@ -1,7 +1,7 @@
-"""Text of strangers -> text and data inside a page, which nothing in it can leave.
+"""Escape text from foreign files for a page, so that it cannot act as markup or script.
 
-Control codes, what turns the direction of writing and halves of characters are shown as their code
-(`host.text.shown`): XML has no way to write most of them at all.
+Control codes, characters that turn the direction of writing and lone surrogates are shown as their
+code (`host.text.shown`), since XML cannot hold most of them.
 """
 
 from __future__ import annotations

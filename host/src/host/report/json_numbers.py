@@ -19,7 +19,7 @@ class JsonNumbers:
     document : dict
         What ``host identify --json`` prints.
     file : str
-        Under which the page holds it.
+        File name under which the page holds it.
     """
 
     document: dict[str, Any]

@@ -1,6 +1,6 @@
 """Measured against model: one step ahead, free, and of maneuvers the fit has not seen.
 
-Nothing is computed here: the histories are those of the answer.
+Draws the answer's own histories; nothing is computed here.
 """
 
 from __future__ import annotations
@@ -90,6 +90,6 @@ def _measured(axes: Any, t_s: Array, maneuver: Maneuver, outputs: Any, inputs: A
 
 def _model(axes: Any, t_s: Array, values: Array, outputs: Any, colour: str) -> None:
     if values.shape != (len(t_s), len(outputs)):
-        return  # of frequencies the fit has no histories
+        return  # a fit in the frequency domain has no time histories
     for j, name in enumerate(outputs):
         axes[j].plot(t_s, shown(name)[1] * values[:, j], color=colour, lw=0.8, zorder=2)

@@ -1,4 +1,4 @@
-"""A long flight on few points: smallest and largest value of each stretch of time (min-max)."""
+"""A long flight reduced to few points: minimum and maximum of each stretch of time."""
 
 from __future__ import annotations
 

@@ -16,7 +16,8 @@ AROUND_S = 5.0  # before and behind a test point
 OVERVIEW_BUCKETS = 4000  # two points each: more than any screen has columns
 OVERVIEW_BYTES = 2_600_000  # of the page; script and text are the rest of 3 MB
 PAGE_BYTES = 9_400_000  # of all samples; script, text and track are the rest of 10 MB
-SURELY = 0.7  # of the fewest bytes a row: a stretch that is larger even so is not packed to see it
+# A stretch is not even packed if at this share of the fewest bytes a row it would be too large.
+SURELY = 0.7
 _ROWS_AT_ONCE = 1 << 18  # of a stretch
 
 
@@ -32,7 +33,7 @@ class PageData:
     whole : bool
         Whether every sample of the flight is there.
     remarks : list of str
-        What is not, in words.
+        Remarks on what was left out.
     """
 
     overview: Packed

@@ -11,7 +11,7 @@ from host.report.json_numbers import JsonNumbers
 _CLASS = {
     "trust": "good", "use with care": "fair", "do not rely on": "poor", "do not use": "poor",
 }  # fmt: skip
-# No single cause makes a quarter of the variance; of a coefficient: none beside its derivative.
+# Shown where no single cause makes a quarter of the variance.
 _SEVERAL, _DERIVATIVE = "several, none a quarter", "as its derivative"
 
 
@@ -91,7 +91,7 @@ def _coefficients(numbers: JsonNumbers, at: int, label: str, causes: Mapping[str
 
 
 def _prior_of(numbers: JsonNumbers, answer: dict[str, object]) -> str:
-    """Return the prior's table that belongs to an answer: of its model, whatever the method.
+    """Return the prior comparison of an answer's model, whatever the method.
 
     Where coefficients were fitted directly there is theirs alone.
     """
@@ -105,7 +105,7 @@ def _mark(mark: str) -> str:
 
 
 def _without_empty(heads: list[str], rows: list[list[str]], words: tuple[int, ...]) -> str:
-    """Return a table without columns that say nothing in any row."""
+    """Return a table without columns that are empty in every row."""
     kept = [
         k for k in range(len(heads)) if k < 2 or any(row[k] not in ("", "\u2013") for row in rows)
     ]

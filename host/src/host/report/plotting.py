@@ -1,4 +1,4 @@
-"""From a request to a page and pictures: what `host plot` does."""
+"""`host plot`: write a flight's page and pictures."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class PlotRequest:
 
 @dataclass(frozen=True, slots=True)
 class Plotted:
-    """What came of it: files, words, exit code."""
+    """Files written, lines for the user, exit code."""
 
     files: list[Path]
     lines: list[str]

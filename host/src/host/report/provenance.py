@@ -1,4 +1,4 @@
-"""What a report rests on: versions, hashes of every file, the command line."""
+"""Provenance of a report: versions, hashes of every file, the command line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The write-up of an identification as one page to mail and to print."""
+"""The report of an identification as one page to mail and to print."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ _FLY = ("fly", "learn")  # words of lines that say what to do next
 
 @dataclass(frozen=True, slots=True)
 class ReportParts:
-    """What a report is made of.
+    """Contents of a report.
 
     Attributes
     ----------
     found : Identification
     beside : Identification or None
-        The same flights by another method: stands beside the first, and is not judged.
+        The same flights by a second method, for comparison only: no verdict is given of it.
     flights : list of ShownFlight
         Of the sources that are logs.
     aircraft : str
@@ -131,7 +131,7 @@ def _titles(numbers: JsonNumbers) -> list[str]:
 
 
 def _simulated(parts: ReportParts) -> str:
-    """Return a line where a flight was none."""
+    """Return a line if any of the flights was simulated."""
     recorders = any(is_simulated(flight.summary) for flight in parts.flights)
     if not recorders and parts.found.truth is None:
         return ""
@@ -144,7 +144,7 @@ def _methods(numbers: JsonNumbers, beside: list[JsonNumbers]) -> str:
         return said
     return (
         "<p>Equation error is a regression: it needs no search and no start value, and noise in"
-        " what it regresses on pulls it towards zero. It is there to compare and was not judged"
+        " its regressors biases it towards zero. It is shown for comparison and has no verdict"
         " (<code>--method</code> chooses others).</p>" + said
     )
 
@@ -227,7 +227,7 @@ def _advice(found: Identification) -> list[str]:
         if not line.startswith(" "):
             about = line.partition(":")[0]
         if any(word in line.split() for word in _FLY) or "measure " in line:
-            what = line.strip().replace("to learn them", "for what is not to be relied on", 1)
+            what = line.strip().replace("to learn them", "for parameters not to be relied on", 1)
             said[what if what.startswith(about) else f"{about}: {what}"] = None
     return list(said) or ["nothing: the verdict asks for no other maneuver"]
 

@@ -1,4 +1,4 @@
-"""From a request to a write-up: what `host report` does."""
+"""`host report`: identify and write the report page."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class ReportRequest:
     options : mapping
         Further arguments of `host.identify`.
     files : list of Path
-        Whatever else the answer rests on, for the appendix.
+        Further input files (aircraft, prior), for the appendix.
     """
 
     sources: list[Path]
@@ -55,7 +55,7 @@ class ReportRequest:
 
 
 def write_report(request: ReportRequest) -> tuple[Path, Identification]:
-    """Identify, write the page, return where and what was found.
+    """Identify, write the page, return its path and the identification.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def _beside(
 def _flight(
     source: Path, calibration: Path | None, options: Mapping[str, Any]
 ) -> ShownFlight | None:
-    """Return a log as it is shown; None of a table, which knows nothing of its recording."""
+    """Return a log as a flight to show; None for a table, which has no events and losses."""
     if source.suffix.lower() in _TABLES:
         return None
     try:

@@ -1,4 +1,4 @@
-"""A flight as it is shown: columns in SI, maneuvers, events, losses and what is said of it."""
+"""A flight to show: columns in SI, maneuvers, events, losses and its summary."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ class ShownFlight:
     Attributes
     ----------
     name : str
-        File name, cleaned of what a terminal or a page would obey.
+        File name without control characters and markup.
     columns : mapping of str to (rows,) array
         As `host.physical.columns.COLUMNS` names them, SI, ``t_s`` rising; where rows are missing a
         row of NaN stands, so that no line is drawn over a gap.
     units, texts : mapping of str to str
     lines : list of str
-        What `host decode` says.
+        Lines of `host decode`.
     summary : dict
         The same as data.
     maneuvers : list of (DetectedManeuver, Grade)

@@ -1,1 +1,1 @@
-"""What is kept of every flight: a Parquet dataset that a second run continues."""
+"""The Parquet dataset of all flights, which a second run continues."""

@@ -29,10 +29,10 @@ SCHEMA = pa.schema(
         ("errors", _TEXTS),
         ("error_sources", _TEXTS),
         ("loadings", _NUMBERS),  # error by error: shift of every estimate by one deviation of it
-        ("watched", _TEXTS),  # what no derivative shows, with values and standard deviations
+        ("watched", _TEXTS),  # names of quantities that are no derivatives (`watched_quantities`)
         ("watched_values", _NUMBERS),
         ("watched_deviations", _NUMBERS),
-        ("doubted", _TEXTS),  # by findings about the data
+        ("doubted", _TEXTS),  # derivatives that a finding about the data speaks against
         ("verdict", _TEXTS),
         ("findings", pa.string()),
         ("delays", pa.string()),

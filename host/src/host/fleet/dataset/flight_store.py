@@ -1,9 +1,9 @@
-"""Rows of flights on disk: each whole or not there, none twice, whenever a run is stopped.
+"""Rows of flights on disk: whenever a run is stopped, each is whole or absent, none twice.
 
 A new row is a file of its own in `new/`, under its key. `compact` moves rows into
 `flights/type=T/aircraft=A/month=M/flights.parquet`: a partition's file is written beside and takes
-the old one's place at once, and only then the new rows go. What a stop leaves in `new/` that is in
-a partition already is dropped by the next run.
+the old one's place in one step; only then the new rows are deleted. If a run is stopped in
+between, the next one drops the rows in `new/` that a partition already has.
 """
 
 from __future__ import annotations
@@ -80,7 +80,8 @@ class FlightStore:
         plain = pa.schema([f for f in SCHEMA if f.name not in PARTITIONS])
         old = [parquet.ParquetFile(target).read()] if target.is_file() else []
         fresh = [parquet.ParquetFile(p).read().select(plain.names) for p in paths]
-        # A log has one row: that of another aircraft file or version takes the place of the last.
+        # A log has one row: an answer with another aircraft file or version replaces the earlier
+        # one.
         rows = {row["log_id"]: row for table in (*old, *fresh) for row in table.to_pylist()}
         ordered = sorted(rows.values(), key=lambda row: (row["date"], row["source"]))
         _published(pa.Table.from_pylist(ordered, schema=plain), target)
@@ -117,7 +118,7 @@ class FlightStore:
         )
 
     def drop(self, unwanted: Callable[[dict[str, Any]], bool]) -> None:
-        """Forget rows: of flights to be tried again, or that another answer has replaced."""
+        """Delete rows of flights to be tried again, or whose answer a newer one has replaced."""
         for path in self._flights.rglob(_FILE):
             table = parquet.ParquetFile(path).read()
             good = [row for row in table.to_pylist() if not unwanted(row)]

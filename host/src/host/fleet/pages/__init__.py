@@ -1,1 +1,1 @@
-"""What a fleet says, on a page."""
+"""The page of a type: estimates, changes, advice."""

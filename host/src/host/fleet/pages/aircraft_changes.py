@@ -26,7 +26,7 @@ class AircraftHistory:
     ----------
     aircraft : str
     flights : tuple of LoadedFlight
-        Those that tell every derivative of `names`.
+        Flights that have an estimate of every quantity in `names`.
     names : tuple of str
     alarms : tuple of Alarm
     """
@@ -38,12 +38,12 @@ class AircraftHistory:
 
     @property
     def judged(self) -> int:
-        """How many flights were held against the first ones."""
+        """How many flights were compared with the first ones."""
         return max(len(self.flights) - BASELINE, 0)
 
 
 def histories(model: TypeModel) -> list[AircraftHistory]:
-    """Return every aircraft of a type, each held against its own first flights."""
+    """Return every aircraft of a type, each compared with its own first flights."""
     flown = {a: _flown(model, a) for a in model.aircraft}
     first = [f for flights in flown.values() for f in flights[:BASELINE]]
     known = [*model.effects, *dict.fromkeys(n for f in first for n in f.watched)]
@@ -100,7 +100,7 @@ def _first_parts(
 def _part(flight: LoadedFlight, names: tuple[str, ...]) -> tuple[Array, Array]:
     at = [flight.names.index(n) for n in names]
     own = flight.own[np.ix_(at, at)]
-    # Quantities are of different units: each by its own variance.
+    # Quantities have different units, so each is divided by its own deviation.
     return flight.values[at], own + 1e-9 * np.diag(np.maximum(np.diag(own), 1e-12))
 
 

@@ -22,10 +22,10 @@ _MOST_DRIFTS = 4  # derivatives of one aircraft: more are too small to read
 
 
 def funnel_figure(model: TypeModel, name: str) -> Figure:
-    """Return every flight's estimate over its own deviation, and within what they should lie.
+    """Return a funnel plot: every flight's estimate over its standard deviation, with 95 % limits.
 
-    The funnel is the mean and 1.96 of the deviation with the spread between flights; the band the
-    new aircraft's interval.
+    Limits are the mean and 1.96 times the deviation, spread between flights included; the grey
+    band is the interval of a new aircraft.
     """
     from matplotlib.figure import Figure
 

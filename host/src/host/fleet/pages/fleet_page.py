@@ -53,7 +53,7 @@ def fleet_page(model: TypeModel, found: list[AircraftHistory], rows: pd.DataFram
         _section("Aircraft over their flights", _drifts(model, found)),
         _section("Aircraft", _aircraft(model, found)),
         _section("Flights set aside, and why", _aside(aside)),
-        _section("Findings: derivatives of a flight that do not count", _left_out(model)),
+        _section("Findings: derivatives left out, by flight", _left_out(model)),
     ]
     style = page_text("report.css") + _PAIRS
     return HtmlPage(f"{model.name}: fleet", "\n".join(body), style).text()
@@ -83,7 +83,8 @@ def _effects(model: TypeModel) -> str:
     said = "<p>Spreads are standard deviations with 95 % intervals. Errors that all flights share"
     said += " are in the mean's interval and do not average out.</p>"
     if model.single_aircraft:
-        said += f"<p>Told by one aircraft only: {escaped(', '.join(model.single_aircraft))}.</p>"
+        names = escaped(", ".join(model.single_aircraft))
+        said += f"<p>Estimated from one aircraft only: {names}.</p>"
     return table(heads, rows) + said
 
 

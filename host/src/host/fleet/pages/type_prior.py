@@ -1,4 +1,4 @@
-"""A type as a prior for `host identify --prior`: what a further aircraft of it will have."""
+"""A type as a prior for `host identify --prior`: coefficients to expect of its next aircraft."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a type is, in lines for a terminal, and as JSON."""
+"""The model of a type, in lines for a terminal and as JSON."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def type_lines(model: TypeModel) -> list[str]:
         )
     ]  # fmt: skip
     if model.single_aircraft:
-        lines.append(f"told by one aircraft only: {', '.join(model.single_aircraft)}")
+        lines.append(f"estimated from one aircraft only: {', '.join(model.single_aircraft)}")
     return lines
 
 

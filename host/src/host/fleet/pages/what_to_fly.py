@@ -1,4 +1,4 @@
-"""What narrows a type's model most: more aircraft, more flights, or a better calibration."""
+"""Advice that narrows a type's intervals: more aircraft, more flights, better calibration."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 from host.fleet.statistics.spread_intervals import TypeEffect
 from host.fleet.statistics.type_model import TypeModel
 
-_WIDE = 0.10  # of the mean: a half-width above it is worth flying for
+_WIDE = 0.10  # share of the mean: advice is given for larger half-widths
 _FEW_AIRCRAFT = 8  # intervals of fewer are widened by their number itself
 _MOST = 4
 
@@ -34,7 +34,7 @@ def advice_lines(model: TypeModel) -> list[str]:
 
 
 def _cause(model: TypeModel, name: str, effect: TypeEffect) -> str:
-    """Return the advice against the largest part of the mean's variance."""
+    """Return the advice that reduces the largest part of the mean's variance."""
     data = model.estimates[name]
     each = data.flights / data.fleet
     own = sum(data.variance.tolist()) / data.flights / each / data.fleet

@@ -1,1 +1,1 @@
-"""A whole run of a fleet: from sources to what is kept and shown."""
+"""A whole run of a fleet: from sources to dataset, models and page."""

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class FleetAnswer:
-    """What a fleet says.
+    """The models of all types of a fleet, with the changes of its aircraft.
 
     Attributes
     ----------

@@ -22,7 +22,7 @@ _COMPACT_EVERY = 500  # new rows: as many small files wait at the most
 
 @dataclass(slots=True)
 class FleetRun:
-    """What a run did.
+    """Counts of a run, and the rows of its flights.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ def run_fleet(
     if new:
         run_tasks(new, limits or TaskLimits(), cluster or ClusterOptions(), keep, tell)
     store.compact()
-    # What a log, or the file in its place, gave before is no flight of its own.
+    # Earlier rows of the same log, or of a file that it replaced, are no further flights.
     given = {name for task in tasks.values() for name in (task.log_id, task.source)}
     store.drop(
         lambda row: not given.isdisjoint((row["log_id"], row["source"])) and row["key"] not in tasks

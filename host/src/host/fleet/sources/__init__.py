@@ -1,1 +1,1 @@
-"""Which logs there are, and whose each is."""
+"""The logs of a fleet, and the aircraft that each belongs to."""

@@ -4,8 +4,8 @@
     north/**,,N-01,trainer,trainer.toml,logger7.toml,,
     ,6d6f636b,N-02,trainer,trainer.toml,logger8.toml,,
 
-A row is for the logs that its pattern or folder names, or whose card or autopilot has its serial;
-the first that fits counts. Paths are from the table's folder.
+A row belongs to the logs that its pattern or folder names, or whose card or autopilot has its
+serial. The first row that fits counts. Paths are from the table's folder.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _MOST_BYTES = 64 << 20
 
 @dataclass(frozen=True, slots=True)
 class TableRow:
-    """One row; what is empty is not said."""
+    """One row; an empty field states nothing."""
 
     source: str = ""
     serial: str = ""

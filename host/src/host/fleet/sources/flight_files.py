@@ -94,7 +94,7 @@ def _at_address(source: str) -> list[str]:
 
 
 def log_id(source: str, seen: dict[str, str]) -> str:
-    """Return the SHA-256 of a log; of one at an address what its store says in place of it.
+    """Return the SHA-256 of a log, or for an address the identifier that its store gives.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Each flight's task, with the hash that says whether its answer is known already."""
+"""Each flight's task, with the hash by which an earlier answer is found."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from host.physical.calibration import load_calibration
 
 @dataclass(slots=True)
 class FleetSources:
-    """Everything a run was given of its flights.
+    """Sources of a run's flights, and the options common to all.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ def _type_of(file: str) -> str:
 
 
 def _aircraft_id(file: str) -> str:
-    """Return the hash of what an aircraft file says, whatever its comments."""
+    """Return the hash of an aircraft file's content, comments excluded."""
     load_measured(file)
     text = json.dumps(read_document(file), sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -1,4 +1,4 @@
-"""S3 and what speaks like it, read by the library that writes our Parquet, where s3fs is missing.
+"""S3 and compatible stores, read by pyarrow where s3fs is missing.
 
 Keys, region and another server's address come from where every tool of S3 has them: the variables
 AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION, AWS_ENDPOINT_URL, or ~/.aws.
@@ -21,7 +21,7 @@ _CONNECT_S, _ANSWER_S = 10.0, 60.0
 
 
 class ArrowS3(ArrowFSWrapper):  # type: ignore[misc]  # fsspec has no types
-    """A store of S3 as fsspec wants it."""
+    """An S3 store with the interface of fsspec."""
 
     protocol = "s3"
 

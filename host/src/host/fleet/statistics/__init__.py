@@ -1,1 +1,1 @@
-"""What many flights of many aircraft say of their type: numbers in, numbers out."""
+"""Statistics of a type from many flights of many aircraft: numbers in, numbers out."""

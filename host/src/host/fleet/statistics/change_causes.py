@@ -1,4 +1,4 @@
-"""What a change of the aircraft does to its derivatives: one pattern for each likely cause.
+"""How a change of the aircraft shifts its derivatives: one pattern for each likely cause.
 
 Sizes are shares (of a throw, a mass, a vane's or a pot's slope), of the CG shares of the chord, aft
 positive, of a vane's zero rad, of a servo's lag s.

@@ -1,10 +1,10 @@
-"""Has an aircraft changed? Each flight beside the aircraft's own first ones, and the likely cause.
+"""Test whether an aircraft has changed since its own first flights, and name the likely cause.
 
 A cause moves several derivatives in a pattern of its own. For each cause, and each of the last few
 flights as the first of the change, its size is estimated by generalised least squares; that over
 its standard deviation is the statistic (generalised likelihood ratio: Basseville & Nikiforov,
-Detection of Abrupt Changes, ch. 2). The largest of all is held against the threshold. Errors that
-an aircraft's flights share are in its first flights, too, and cancel.
+Detection of Abrupt Changes, ch. 2). The largest is compared with the threshold. Errors that all
+flights of an aircraft share are in its first flights too, so they cancel.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from scipy import special
 
 from host.arrays import Array
 
-BASELINE = 8  # flights that say what the aircraft is
+BASELINE = 8  # first flights, with which later ones are compared
 WINDOW = 4  # flights over which a change is looked for
 # Of a hundred flights of unchanged aircraft 0.4 begin an alarm (`studies.fleet_changes`).
 THRESHOLD = 3.75
-_NEAR = 4.0  # of the square: a cause as near to the best is not ruled out
+_NEAR = 4.0  # a cause whose squared statistic is at most so much below the best is named too
 _MOVED = 2.0  # standard deviations
-SELDOM = 0.025  # of types whose flights scatter as they say, above the usual mean square
+SELDOM = 0.025  # probability that honest covariances give so large a mean square
 
 Mean = tuple[Array, Array]  # (P,) and its covariance
 
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """What a flight says of a change.
+    """A change found at one flight, and its likely cause.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class ChangeTest:
     rare : frozenset of str
         Causes that are named first only where no other explains a change nearly as well.
     scales : dict of str to float
-        By how much a cause's size scatters more than covariances say; 1 without (`scaled`).
+        Ratio of a cause's real scatter to that by the covariances; 1 without it (`scaled`).
     """
 
     patterns: Mapping[str, Array]
@@ -81,11 +81,11 @@ class ChangeTest:
     scales: Mapping[str, float] = field(default_factory=dict)
 
     def scaled(self, first: Sequence[tuple[Sequence[Array], Sequence[Array]]]) -> ChangeTest:
-        """Return the test with what unchanged flights of the type say of each cause.
+        """Return the test with the scatter of each cause in unchanged flights of the type.
 
-        Each of an aircraft's first flights is held against the others of them. A cause whose size
-        scatters by more than covariances allow is counted in that scatter: what a flight's interval
-        misses is then no change.
+        Each of an aircraft's first flights is compared with the rest of them. Where a cause's size
+        scatters by more than the covariances allow, that scatter counts, so that intervals which
+        are too narrow raise no alarm.
 
         Parameters
         ----------
@@ -170,7 +170,7 @@ class ChangeTest:
 
 @dataclass(frozen=True)
 class _Flown:
-    """Values of flights, (n, P), and the inverse of what each may be wrong by, (n, P, P)."""
+    """Values of flights, (n, P), and the inverse of their covariances, (n, P, P)."""
 
     values: Array
     inverses: Array

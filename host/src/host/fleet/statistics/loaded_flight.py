@@ -1,4 +1,4 @@
-"""What one flight says of every derivative, and with which flights it shares its errors."""
+"""One flight's estimates of the derivatives, and the errors that it shares with other flights."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from host.arrays import Array
 from host.fleet.statistics.variance_components import FleetEstimates
 
-LOCAL_RANK = 3  # patterns of the shared errors of one aircraft; more are the flight's own
+LOCAL_RANK = 3  # patterns kept of one aircraft's shared errors; the rest counts as the flight's
 _LEFT_SHARE = 1e-3  # of the variance of shared errors that may count as the flights' own
 _MOST_PATTERNS = 40
 
@@ -30,8 +30,7 @@ class LoadedFlight:
     own : Array, shape (P, P)
         Covariance that no other flight shares.
     sources : tuple of (str, str), length E
-        Of each shared error: whose it is, and its name. Errors of one source are one and the same
-        in all its flights.
+        Owner and name of each shared error. All flights with the same source have the same error.
     loadings : Array, shape (E, P)
         Shift of all values by one standard deviation of each.
     left_out : frozenset of str
@@ -41,7 +40,7 @@ class LoadedFlight:
     conditions : dict
         Of the flight and its aircraft file.
     watched : dict of str to (float, float)
-        Value and standard deviation of what no derivative shows (`watched_quantities`).
+        Value and standard deviation of quantities that are no derivatives (`watched_quantities`).
     """
 
     aircraft: str
@@ -69,11 +68,11 @@ class LoadedFlight:
 def fleet_estimates(flights: Sequence[LoadedFlight], name: str) -> FleetEstimates:
     """Return the estimates of one derivative from all flights that count.
 
-    Errors of a source that only one aircraft's flights have are that aircraft's; others are shared
-    by aircraft. Each shifts all its flights by the mean of their loadings, and what a flight's own
-    differs by counts as its own error. For a loading goes with the estimate that it was computed
-    at: a low estimate has a small one, would be taken for sure, and draw the mean down (Peelle's
-    puzzle: D'Agostini, Nuclear Instruments and Methods A 346, 1994).
+    An error whose source only one aircraft has is local to that aircraft; others are shared by
+    aircraft. A shared error shifts all its flights by the mean of their loadings, and the
+    difference to a flight's own loading counts as the flight's own error. Otherwise a low
+    estimate, whose loading is small with it, would get too much weight and bias the mean low
+    (Peelle's puzzle: D'Agostini, Nuclear Instruments and Methods A 346, 1994).
     """
     own_flights = sorted((f for f in flights if f.has_estimate(name)), key=lambda f: f.aircraft)
     at = [f.names.index(name) for f in own_flights]

@@ -1,8 +1,8 @@
-"""Coefficients of a flight about another centre of gravity: moments, and what a rate does there.
+"""Coefficients of a flight about another centre of gravity: moments and rate derivatives.
 
-A point x ahead of the CG meets alpha less q x / V, so that rate derivatives change with the place
-as well as moments. Etkin & Reid, Dynamics of Flight, 3rd ed., ch. 5; the force's part is that of
-`derivative_conversion`.
+At a point x ahead of the CG the angle of attack is smaller by q x / V, so rate derivatives change
+with the reference point as moments do. Etkin & Reid, Dynamics of Flight, 3rd ed., ch. 5; the
+force's part is that of `derivative_conversion`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def about_cg(flight: LoadedFlight, shift_m: Place) -> LoadedFlight:
     count = len(flight.names)
     constant = _moved(flight, np.zeros(count), shift_m)
     gain = np.stack([_moved(flight, row, shift_m) - constant for row in np.eye(count)], axis=1)
-    # What cannot be moved for want of its forces does not count.
+    # Derivatives whose forces are unknown cannot be moved and are left out.
     lost = {n for n in flight.names if _needs(n) - set(flight.names)}
     return replace(
         flight,
@@ -73,7 +73,7 @@ def _moved(flight: LoadedFlight, values: Array, shift_m: Place) -> Array:
 
 
 def _needs(name: str) -> set[str]:
-    """Return the derivatives that a derivative about another point is made of."""
+    """Return the derivatives from which a derivative about another point is computed."""
     row, _, label = name.partition("_")
     force = {"Cm": "CL", "Cl": "CY", "Cn": "CY"}.get(row)
     needed = {f"{force}_{label}"} if force and label else set()

@@ -39,8 +39,7 @@ MANY = 1e9  # degrees of freedom: as good as infinitely many
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """A value and the ends of its two-sided 95 % interval; an end that nothing tells is infinite
-    or not a number."""
+    """A value and the ends of its two-sided 95 % interval; an unknown end is infinite or NaN."""
 
     value: float
     lower: float
@@ -70,7 +69,7 @@ class TypeEffect:
         Standard deviation of the mean by errors that several aircraft share.
     aircraft, flights : int
     differs : float
-        Probability of such scatter between aircraft if they were all the same.
+        Probability of so much scatter between aircraft if they were all alike.
     """
 
     mean: Interval
@@ -84,7 +83,7 @@ class TypeEffect:
 
     @property
     def new_aircraft(self) -> Interval:
-        """What a further aircraft of the type will have, with its 95 % interval."""
+        """Prediction for the next aircraft of the type: the mean, with its 95 % interval."""
         half = _student(self.aircraft - 1) * math.hypot(self.mean_deviation, self.between.value)
         half = math.hypot(half, NORMAL_95 * self.shared_deviation)
         return Interval(self.mean.value, self.mean.value - half, self.mean.value + half)
@@ -92,7 +91,7 @@ class TypeEffect:
 
 @dataclass(frozen=True, slots=True)
 class KnownSpreads:
-    """Spreads told beforehand, for an oracle to compare with; None: estimated."""
+    """Spreads known beforehand, as an oracle's for comparison; None: estimated."""
 
     between: float | None = None
     within: float | None = None
@@ -217,7 +216,7 @@ def _probability_alike(data: FleetEstimates, within: float, known: KnownSpreads)
 
 
 def _denominator(data: FleetEstimates, between: float, within: float) -> float:
-    """Return the degrees of freedom of what the aircraft's scatter is divided by.
+    """Return the degrees of freedom of the F test's denominator.
 
     The variance of an aircraft's mean is `between` and a part by flights; of the latter the spread
     between flights is estimated from (flights - aircraft) squares.

@@ -1,4 +1,4 @@
-"""A type from its flights: every derivative with its spreads, and what a further aircraft is."""
+"""The model of a type from its flights: every derivative with its spreads."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ class TypeModel:
     effects : dict of str to TypeEffect
         By derivative.
     estimates : dict of str to FleetEstimates
-        What each was made from.
+        Estimates of every flight from which each effect was computed.
     flights : tuple of LoadedFlight
         About the reference CG.
     single_aircraft : tuple of str
-        Derivatives that fewer than two aircraft tell.
+        Derivatives that only one aircraft has estimates of.
     cg_m : tuple of float, optional
-        What moments are about.
+        Reference point of the moments.
     """
 
     name: str

@@ -21,10 +21,10 @@ from scipy import optimize
 
 from host.arrays import Array, IntArray
 
-FEWEST_AIRCRAFT = 2  # below, nothing tells aircraft from type
+FEWEST_AIRCRAFT = 2  # with one, its departure from the type cannot be estimated
 MAD_TO_DEVIATION = 1.4826  # of a normal distribution
 _START_SHARE = 0.02  # of the scatter: the search begins at no smaller variance
-_WILD = 10.0  # scatter over that of most: moments may then be far from where to begin
+_WILD = 10.0  # ratio of scatter to that of most values, above which moments are a bad start
 _ZERO_SHARE = 1e-7  # of the scatter: a variance below it is zero
 
 
@@ -70,13 +70,14 @@ class FleetEstimates:
 
     @cached_property
     def scatter(self) -> float:
-        """Variance of all values: no spread is sought much beyond it."""
+        """Variance of all values, the limit of the search for a spread."""
         return float(np.var(self.value)) or 1.0
 
     @cached_property
     def grain(self) -> float:
-        """The same of most values, the scale of the search: one flight that tells nothing, with a
-        wild value and the deviation that belongs to it, shall not coarsen it."""
+        """Variance of most values, the scale of the search: a single flight with a wild value and
+        a large deviation must not coarsen it.
+        """
         off = np.abs(self.value - np.median(self.value))
         return min(float(MAD_TO_DEVIATION * np.median(off)) ** 2, self.scatter) or self.scatter
 
@@ -97,7 +98,7 @@ class FleetEstimates:
 
 @dataclass(frozen=True, slots=True)
 class Reduced:
-    """What is left once all random effects are eliminated.
+    """The generalised least-squares problem after elimination of the random effects.
 
     Attributes
     ----------
@@ -179,7 +180,7 @@ def restricted_likelihood(data: FleetEstimates) -> tuple[float, float]:
     """
     scale = data.grain
     floor = 0.0 if float(np.min(data.variance)) > 0.0 else _ZERO_SHARE
-    # Aircraft of one flight each: the two variances are one, and all of it counts as aircraft's.
+    # With one flight per aircraft the two variances cannot be separated; all is the aircraft's.
     limits = [(0.0, None), (floor, floor if data.flights == data.fleet else None)]
 
     def deviance(x: Array) -> float:

@@ -1,6 +1,6 @@
-"""What no derivative shows, watched for changes: zeros of vanes, throws and lags of servos.
+"""Quantities that are no derivatives, watched for changes: vane zeros, servo throws and lags.
 
-alpha_zero_rad, beta_zero_rad    what a vane shows where the air does not lift, or push aside
+alpha_zero_rad, beta_zero_rad    vane reading at zero normal force, and at zero side force
 elevator_slope                   position by the pot over the pulse, rad/us; aileron, rudder
 elevator_lag_s                   by which the position is behind the pulse; aileron, rudder
 servo_lag_s                      the same of all, where no pot measures and the answer tells it

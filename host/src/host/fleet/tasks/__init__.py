@@ -1,1 +1,1 @@
-"""Each flight by itself: what is asked of it, who runs it, and what becomes of one that fails."""
+"""Each flight's identification as a task in a child process that may fail."""

@@ -2,8 +2,8 @@
 
     python -m host.fleet.tasks.child_program MODULE:FUNCTION
 
-Requests come as lines of JSON on stdin, answers go as lines of JSON to stdout. When stdin ends, the
-worker is gone, and the child ends whatever it is doing.
+Requests come as lines of JSON on stdin, answers go as lines of JSON to stdout. The end of stdin
+means that the worker is gone; the child then ends at once.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Row = dict[str, Any]
 def main(work: str) -> None:
     """Answer requests until stdin ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the worker's to answer
-    # What a library prints is no answer.
+    # Text that a library prints must not get between the answers.
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     requests: queue.SimpleQueue[str] = queue.SimpleQueue()
@@ -54,7 +54,7 @@ def _answered(function: Callable[[Row], Row], request: Row) -> Row:
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         return {"refused": f"{where}{error.strerror or error}"}
-    except Exception as error:  # one log's fault is no other's
+    except Exception as error:  # one bad log must not end the others
         return {"refused": f"internal error: {type(error).__name__}: {error}; please report it"}
 
 

@@ -1,7 +1,8 @@
 """An answer's covariance in two parts: the flight's own, and a loading of each named error.
 
-A loading is the shift of all estimates by one standard deviation of an error. Its flights share an
-error of a calibration or of an aircraft file, so that neither part may be averaged like the other.
+A loading is the shift of all estimates by one standard deviation of an error. Flights of one
+calibration or aircraft file share its errors, so their mean does not reduce these as it reduces
+the flights' own.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ _SMALL_SHARE = 1e-4  # of every variance: a loading below it counts as the fligh
 
 @dataclass(frozen=True, slots=True)
 class LoadedEstimates:
-    """Estimates of a flight and what they may be wrong by.
+    """Estimates of a flight with their covariance in parts.
 
     Attributes
     ----------
@@ -29,7 +30,7 @@ class LoadedEstimates:
     own : Array, shape (P, P)
         Covariance that no other flight shares.
     errors, sources : tuple of str, length E
-        Names of shared errors, and whose they are (`host.instrument.error_sources`).
+        Names of shared errors, and what they belong to (`host.instrument.error_sources`).
     loadings : Array, shape (E, P)
     """
 
@@ -49,8 +50,8 @@ class LoadedEstimates:
 def coefficient_loadings(fit: CoefficientFit, errors: InstrumentErrors) -> LoadedEstimates:
     """Return the parts of a direct fit of coefficients.
 
-    The fit's covariance with its errors has the noise in it by which the flight tells them; what is
-    wrong in every flight alike is the pull of each error's prior alone (`CoefficientFit`).
+    The fit estimates the errors too, so its covariance contains the noise of those estimates.
+    Common to all flights is only the effect of each error's prior (`CoefficientFit`).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""One flight identified, as one row: what a child process does."""
+"""Identify one flight and return it as one row; runs in a child process."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from host.sysid.pipeline.identification import Identification
 from host.sysid.pipeline.stages import identify
 
 _GPS_EPOCH = datetime(1980, 1, 6, tzinfo=UTC)
-_POSTERIOR_PRIOR_RATIO = 0.9  # of what was assumed: an estimate nearly as wide says nothing
+_POSTERIOR_PRIOR_RATIO = 0.9  # an estimate whose deviation is nearly its prior's is left out
 _LEAST_WEEK = 1024  # below, a receiver without almanac counts from its own beginning
 
 Watched = dict[str, tuple[float, float]]
@@ -79,7 +79,7 @@ def flight_row(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _identified(path: Path, values: dict[str, Any]) -> Identification:
-    """Identify a flight: its coefficients, or linear models where no vane tells them."""
+    """Identify a flight: its coefficients, or linear models where it has no vanes."""
     how = {
         "aircraft": values["aircraft_file"],
         "calibration": values["calibration"] or None,
@@ -99,7 +99,7 @@ def _identified(path: Path, values: dict[str, Any]) -> Identification:
 
 
 def _estimate_columns(parts: LoadedEstimates, values: dict[str, Any]) -> dict[str, Any]:
-    # Who never was calibrated is wrong in a way of its own.
+    # An instrument without a calibration shares its errors with no other.
     instrument = values["calibration_id"] or f"uncalibrated, {values['aircraft']}"
     whose = {
         AIRCRAFT_FILE: f"aircraft file {values['aircraft_id']}",
@@ -155,7 +155,7 @@ def _condition(fit: CoefficientFit) -> dict[str, float]:
 def _trimmed(found: Identification) -> dict[str, float]:
     """Return the condition of linear answers: that of level flight at their trim.
 
-    The drag is not known and left out: of Cm_alpha about another CG it is the hundredth part.
+    Drag is unknown and left out; it makes a hundredth of the change of Cm_alpha with the CG.
     """
     first, known = found.linear[0], found.aircraft
     assert known is not None  # a fleet's flights have an aircraft file

@@ -1,4 +1,4 @@
-"""A child process for one flight after another, killed where one takes too much.
+"""A child process for one flight after another, killed if a flight exceeds its limits.
 
 Dask cannot stop a task that runs, and its workers may have no children by `multiprocessing`. So
 each worker starts a program of its own (`child_program`), gives it flights over a pipe, watches its
@@ -33,7 +33,7 @@ _LOOK_S = 0.05  # between two looks at a child's memory
 _START_S = 300.0  # to import everything on a computer that is busy
 _END_S = 5.0  # until a process that closed its pipes has ended, too
 _TRIES = 2  # of a flight whose child ended by itself
-_KEEP_SHARE = 0.5  # of the memory's limit: a child that grew beyond it makes room for another
+_KEEP_SHARE = 0.5  # share of the memory limit beyond which a child is replaced between flights
 _MEGABYTE = 1e6
 
 

@@ -1,4 +1,4 @@
-"""Coefficients of linear models in two parts, for flights that no vane tells: an autopilot's.
+"""Coefficients of linear models in two parts, for flights without vanes, as an autopilot's.
 
 Their intervals are those of `host identify`: Student's quantile of few maneuvers is in the flight's
 own covariance. Both axes are of one flight, so that one error shifts the coefficients of both.
@@ -53,7 +53,7 @@ def linear_loadings(answers: Sequence[Answer], errors: InstrumentErrors) -> Load
         for error, shift in _shifts(parts).items():
             if error in ERROR_LABELS or error in _SENSED.values() or error in _ASSUMED.values():
                 shifts.setdefault(error, np.zeros(len(names)))[here] = shift
-            else:  # what the model leaves open in this flight, no sensor's
+            else:  # an error of the model in this flight, not of a sensor
                 own[here, here] += np.outer(shift, shift)
     values = np.concatenate([parts.values for parts in estimated]) if estimated else np.zeros(0)
     total = own + sum((np.outer(s, s) for s in shifts.values()), np.zeros_like(own))
@@ -61,8 +61,13 @@ def linear_loadings(answers: Sequence[Answer], errors: InstrumentErrors) -> Load
 
 
 def _shifts(parts: CoefficientParts) -> dict[str, Array]:
-    """Return shifts by one deviation of every error; of the vanes what upwash allows for, if that
-    is larger than what was sensed."""
+    (
+        """Return the shifts by one deviation of every error.
+
+    Vane errors and upwash together have the larger of the variances sensed and assumed.
+    """
+        ""
+    )
     found = {_SENSED.get(error, error): shift for error, shift in parts.sensed}
     vanes = [shift**2 for error, shift in parts.sensed if SHARED.get(error) == VANE]
     for cause, shift in parts.assumed.items():

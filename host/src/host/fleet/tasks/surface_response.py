@@ -1,4 +1,4 @@
-"""What surfaces do with their pulses, where pots measure them: the slope, and the lag behind them.
+"""Slope and lag of surface positions, as pots measure them, against the servo pulses.
 
 The position is a straight line of the pulse some time ago. That time is the one that leaves the
 smallest squares; it holds the delay and the first order of the servo together.
@@ -28,7 +28,7 @@ _LEAST_BLOCKS = 20
 
 @dataclass(frozen=True, slots=True)
 class SurfaceResponse:
-    """Position over pulse, each with its standard deviation.
+    """Slope and lag of a surface, each with its standard deviation.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ def _least(t: Array, pulse: Array, position: Array, lags_s: Array) -> float:
 
 
 def _line(t: Array, pulse: Array, position: Array, lag_s: float) -> tuple[float, Array]:
-    """Return the slope of the position over the pulse that long ago, and what it leaves."""
+    """Return the slope of the position over the pulse `lag_s` earlier, and the residuals."""
     then = np.interp(t - lag_s, t, pulse)
     then = then - then.mean()
     rest = position - position.mean()

@@ -1,4 +1,4 @@
-"""Tasks over the processes of this computer or of any cluster, by Dask.
+"""Run tasks in processes of this computer or of a cluster, by Dask.
 
 No more tasks are given out at once than keep every worker busy: the scheduler holds no million of
 them, and a run that is stopped has little underway.
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 HERE = "127.0.0.1"
 _AHEAD = 4  # tasks given out for each worker
 _LEAST_AHEAD = 16
-# A worker that dies takes its tasks to another one, however often: a flight cannot kill a worker,
-# for it runs in a child, so that none of them is to blame.
+# Tasks of a worker that dies go to another one, however often: flights run in children, so none of
+# them can have killed the worker.
 _SETTINGS = {
     "distributed.scheduler.allowed-failures": 10_000,
     "distributed.worker.memory.target": False,
@@ -242,7 +242,7 @@ def check_versions(ours: dict[str, str], theirs: dict[str, dict[str, str]]) -> N
 
 
 def check_readable(theirs: dict[str, str]) -> None:
-    """Check that workers read what they are to read.
+    """Check that every worker can read the sources.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""What vanes show where the air neither lifts nor pushes aside: their zeros, but for a constant.
+"""Vane readings at zero normal and side force: the zeros of the vanes, up to a constant.
 
 alpha less (C_N - CL_de de) / (CL_alpha + CD), beta less (C_Y - CY_dr dr) / CY_beta, mean over the
-maneuvers. Another mass leaves both as they were, for it moves force and slope alike.
+maneuvers. An error of the mass changes neither, since it scales force and slope alike.
 """
 
 from __future__ import annotations

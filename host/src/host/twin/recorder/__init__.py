@@ -1,3 +1,1 @@
-"""The recorder's firmware run through a flight: as a library of this computer or on the simulated
-chip.
-"""
+"""The recorder's firmware in a flight: as a library of this computer or on a simulated chip."""

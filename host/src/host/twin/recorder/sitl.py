@@ -196,8 +196,7 @@ def _record(
 
 
 def file_of(image: mmap.mmap, faults: Sequence[Fault]) -> tuple[bytes, str]:
-    """Return the flight's file and its name; no bytes and the reason where a fault prevents one.
-    """
+    """Return the flight's file and its name; no bytes and the reason where a fault prevents one."""
     reasons = [NO_FILE[fault.kind] for fault in faults if fault.kind in NO_FILE]
     try:
         files = CardReader(image).files()

@@ -237,8 +237,7 @@ def duration_s(card: Card) -> float:
 
 
 def length_s(card: Card, s: Segment) -> float:
-    """Return the length of a segment with the trim before its input and the hands-off time after.
-    """
+    """Return the length of a segment with the trim before its input and the hands-off time."""
     if s.kind in ("trim", "turn"):
         return s.duration_s
     return s.before_s + input_s(s) + card.pilot.hands_off_s
