@@ -1,4 +1,4 @@
-"""From a request to files and a summary: what `host decode` does."""
+"""`host decode`: from a request to files and a summary."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _HEAD_BYTES = 4096
 
 @dataclass(slots=True)
 class Decoded:
-    """What came of it.
+    """Result of decoding: files and summary.
 
     Parameters
     ----------

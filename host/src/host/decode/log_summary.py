@@ -25,7 +25,7 @@ _ENDED = {
 
 
 def summarise(log: FlightLog) -> Json:
-    """Return everything worth saying about a log; plain numbers, lists and words.
+    """Return the summary of a log as plain numbers, lists and words.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ class Path3d:
 
 @dataclass(frozen=True, slots=True)
 class Geography:
-    """What a file of places holds.
+    """Tracks, pieces and marks of a file of places.
 
     Attributes
     ----------

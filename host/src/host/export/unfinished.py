@@ -1,4 +1,4 @@
-"""The name a file has until it is whole."""
+"""Temporary name of a file until it is complete."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every writer of tables offers."""
+"""The interface of all writers of tables."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Columns = Mapping[str, NDArray[Any]]
 
 @dataclass(frozen=True, slots=True)
 class Meta:
-    """What a file says of itself, where its format has a place for it.
+    """Metadata of a table, written where the format has a place for it.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""The door for files of the user: what is read, and how much of it."""
+"""Checked reading of the user's files, with limits on their size."""

@@ -1,4 +1,4 @@
-"""What a number in a file of the user may be: its unit, its range, and where the range is from."""
+"""Permitted numbers in files of the user: unit, range, and source of the range."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What can be read: a file, not a pipe, a device or a folder."""
+"""Checks that a path is a regular file, not a pipe, a device or a folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a user wrote as TOML or text: bounded before it is parsed, and after.
+"""Reads the user's TOML and text files, with limits before parsing and after.
 
 Every reader of an aircraft, calibration, map, model, prior, card or truth comes through here, so
 that no such file can hang, fill the memory, or end in an error of the interpreter.
@@ -18,7 +18,7 @@ DEEPEST = 12  # tables and lists within each other; ours go to 4
 MOST_VALUES = 200_000
 LONGEST_TEXT = 2000  # characters of one text; ours have 200
 LONGEST_KEY = 100
-LARGEST = 1e18  # beyond every number that means something, below all that overflows
+LARGEST = 1e18  # larger than any meaningful number, small enough not to overflow
 _DIGITS = 40  # shown of a number
 
 
@@ -35,7 +35,7 @@ def read_text(
     what : str
         What it should be, for the message.
     encoding_errors : str
-        Of bytes that are no UTF-8: ``strict`` raises, ``replace`` is for what old programs wrote.
+        For bytes that are no UTF-8: ``strict`` raises, ``replace`` serves files of old programs.
 
     Raises
     ------

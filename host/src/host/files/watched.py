@@ -1,4 +1,4 @@
-"""A file that draws a bar while somebody else's reader goes through it."""
+"""A file object that draws a progress bar while a library reads it."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What a user has: versions, extras, ports, caches, and the settings in force."""
+"""Inventory of an installation: versions, extras, ports, caches, settings in force."""

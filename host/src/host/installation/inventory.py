@@ -1,4 +1,4 @@
-"""What is installed, plugged in, kept and set, and where each setting comes from."""
+"""Inventory of libraries, ports, caches and settings, each setting with its origin."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from host.resources import CLONE, resource, user_cache
 from host.twin.recorder import recorder_build
 
 DISTRIBUTION = "flight-test-host"
-# Environment variables that change what is done -> what is so without them.
+# Environment variable -> default without it.
 VARIABLES = {
     "HOST_SITL": "the recorder's library, see below",
     "HOST_ELF": ".pio/build/mega2560/firmware.elf of a clone, for simulate --firmware avr",
@@ -47,7 +47,7 @@ class Library:
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What is in force, and who said so: the environment, a clone, the package, nobody."""
+    """A setting in force and its origin: the environment, a clone, the package, or none."""
 
     name: str
     value: str
@@ -56,7 +56,7 @@ class Setting:
 
 @dataclass(slots=True)
 class Inventory:
-    """All of it.
+    """The whole inventory.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class Inventory:
 
 
 def inventory() -> Inventory:
-    """Look around."""
+    """Return the inventory of this installation."""
     found = Inventory()
     found.versions = {
         "host": _version(DISTRIBUTION) or "run from its sources",

@@ -17,7 +17,7 @@ from host.wire.flight_card import body_parts, number, parts
 from host.wire.framing import EnvelopeReader, envelope
 from host.wire.schema_text import packed_schema
 
-ANSWER_S, FORGETS_S = 1.0, 1.0  # until a byte counts as lost; until the logger forgets the rest
+ANSWER_S, FORGETS_S = 1.0, 1.0  # time until a byte counts as lost, until the logger starts afresh
 TRIES = 4
 STILL_S = 25.0  # from power-on until the logger may know that it stands: 5 s, 18 with one sensor
 ANSWER_BYTES = 9  # id, command, result, part, hash, fault
@@ -33,7 +33,7 @@ SAID = {
 
 
 class CardError(DeviceError):
-    """The logger refuses, or does not answer as it should."""
+    """The logger refuses a request, or its answer is wrong."""
 
 
 class Link(Protocol):
@@ -52,7 +52,7 @@ class Link(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What the logger said of a request."""
+    """The logger's answer to a request."""
 
     command: int
     result: str
@@ -119,7 +119,7 @@ class CardConsole:
         return answer
 
     def _listen(self, seconds: float) -> Answer | None:
-        """Return the next answer within some time; without any time, pass over what has come."""
+        """Return the next answer within `seconds`; with 0 s discard the bytes received so far."""
         until = self._clock() + seconds
         while True:
             for frame in self._reader.feed(self._link.data()):
@@ -168,7 +168,7 @@ class CardConsole:
         Raises
         ------
         CardError
-            If the logger refuses, or keeps something else: then it has no card.
+            If the logger refuses, or its card reads back differently; it then has no card.
         """
         each = parts(card)
         for k, part in enumerate(each):

@@ -33,7 +33,7 @@ _CHIPS = {
 
 
 class DeviceError(HostError):
-    """A device that is missing, busy, silent, or another one."""
+    """A device that is missing, busy, silent, or no logger."""
 
     exit_code = ExitCode.DEVICE
 
@@ -47,7 +47,7 @@ class SerialPort:
     device : str
         What `host status` takes: ``COM5``, ``/dev/ttyACM0``.
     description : str
-        What the system says of it.
+        Description by the operating system.
     vendor_id, product_id : int or None
         USB ids; None for a port that is not on USB.
     serial_number : str
@@ -135,7 +135,7 @@ def choose_port(ports: list[SerialPort]) -> SerialPort:
 
 
 class LineSplitter:
-    """Bytes in any portions in, whole lines out.
+    """Joins bytes that come in portions to whole lines.
 
     A line longer than `LONGEST_LINE` bytes is thrown away with its end: noise has no line ends.
     """
@@ -259,7 +259,7 @@ def _why_not(device: str, error: Exception) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """What came in during one short wait.
+    """Bytes and lines received during one short wait.
 
     Parameters
     ----------

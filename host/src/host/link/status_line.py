@@ -28,9 +28,9 @@ _TITLES = {
 _IMAGE = re.compile(r"([\w .-]{1,32}?) (\d{1,4}\.\d{1,4}\S{0,32})(?: image ([0-9a-f]{8}))?")
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.])")
 _WORDS = r"[\w(][\w ().,:%/-]{0,47}"
-# In the order in which firmware/app/status.cpp writes them; others are shown as they are. What each
-# may say and what its numbers may be: all that the firmware's types hold, so that the readings of a
-# sick sensor are shown.
+# Fields in the order in which firmware/app/status.cpp writes them; other fields are shown as they
+# are. Patterns allow every number that the firmware's types hold, so that readings of a broken
+# sensor are shown.
 _FIELDS: dict[str, tuple[str, float, float]] = {
     "imu": (
         r"missing|(?:ok|original|stale)(?: roll # pitch # deg)?(?: az # mg)?", -32_768, 32_767,
@@ -107,7 +107,9 @@ class StatusLine:
     fields: dict[str, str] = field(default_factory=dict)
 
     def state(self, key: str) -> str:
-        """``ok``, ``missing``, ``stale``, ``original``; of card and relay what they say."""
+        """State of a field: ``ok``, ``missing``, ``stale``, ``original``; for card and relay their
+        text.
+        """
         text = self.fields[key]
         if key == "card":
             return re.sub(r"(\s+\d+( %)?)?(, not recorded)?$", "", text)
@@ -120,7 +122,7 @@ class StatusLine:
         return [float(one) for one in _NUMBER.findall(self.fields[key])]
 
     def complaints(self) -> list[str]:
-        """What is missing or wrong, with what to do; empty if nothing is."""
+        """Lines on what is missing or wrong, with the remedy; empty if nothing is."""
         found = []
         for key in self.fields:
             hint = _HINTS.get((key, self.state(key)))
@@ -137,7 +139,7 @@ class StatusLine:
 
     @property
     def supply_calibrated(self) -> bool:
-        """Whether the chip's reference was compared with a meter once."""
+        """Whether the chip's reference was calibrated with a meter."""
         return not self.fields["avcc"].startswith("about")
 
     def counts(self, key: str) -> list[float | None]:
@@ -239,7 +241,7 @@ def parse_status(line: str) -> StatusLine | None:
 
 
 def _possible(line: StatusLine, key: str) -> bool:
-    """Return whether a field says what the firmware can say."""
+    """Return whether the firmware can have written this field."""
     text = line.fields[key]
     if key not in _KNOWN:
         return len(key) <= _LONGEST_KEY and _LATER.fullmatch(text) is not None

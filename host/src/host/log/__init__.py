@@ -1,4 +1,4 @@
-"""A flight log as one thing: what it holds, what it lost, how good it is."""
+"""A flight log: its frames and table, its losses, its quality."""
 
 from host.log.flight_log import FlightLog
 from host.log.reading import read_log

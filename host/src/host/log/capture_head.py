@@ -1,8 +1,8 @@
-"""What a ground station notes beside the bytes it receives: one JSON object per line.
+"""Notes of a ground station beside the bytes it receives: one JSON object per line.
 
 The bytes stay as they came (`NAME.radio`); `NAME.radio.jsonl` beside them begins with the head and
-goes on with events: marks, resets of the line, schema hashes nobody knows. host/LIVE.md has the
-table. Whoever has the bytes alone loses only the events.
+goes on with events: marks, resets of the line, unknown schema hashes. host/LIVE.md has the table.
+The bytes alone decode too; only the events are then lost.
 """
 
 from __future__ import annotations

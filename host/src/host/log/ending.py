@@ -1,4 +1,4 @@
-"""Behind the last block: was the flight ended, was the file closed, and is its end proven?
+"""The end of a log: whether the session ended, the file was closed, and the end is proven.
 
 Rules: protocol/README.md, "End".
 """
@@ -22,7 +22,7 @@ USUAL_PREALLOCATED_BYTES = 64 << 20  # of logs without a frame `file`
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """What stands behind the last block.
+    """Losses and unproven bytes behind the last block.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class Ending:
 def judge_ending(
     scan: Scan, selection: Selection, store: FrameStore, session: Session | None
 ) -> Ending:
-    """Judge what stands behind the last block of a log.
+    """Judge the bytes behind the last block of a log.
 
     Parameters
     ----------

@@ -123,7 +123,7 @@ class FlightLog:
 
     @property
     def clock_half_width(self) -> float | None:
-        """What GPS leaves open of the clock's scale (95 %), None where it was not put right."""
+        """95 % half-width of the clock's scale after the fit to GPS; None without a correction."""
         clock = self.clock
         return clock.half_width if clock is not None and clock.applied else None
 
@@ -144,7 +144,7 @@ class FlightLog:
 
     @cached_property
     def loss(self) -> Ledger:
-        """What is missing: every lost range with its place, length, seconds, frames and cause."""
+        """Every lost range with its place, length, seconds, frames and cause."""
         if self.stream is not None:
             return make_stream_ledger(self.stream, self.store, self.sessions)
         return make_ledger(self.scan, self.selection, self.store, self.sessions, only=self._only)

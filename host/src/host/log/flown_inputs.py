@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from host.log.flight_log import FlightLog
     from host.physical.session import Session
 
-UNKNOWN = "unknown"  # shape or reason that the log lost
+UNKNOWN = "unknown"  # stands for a shape or reason that the log lost
 
 
 @dataclass(frozen=True, slots=True)

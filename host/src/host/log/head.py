@@ -1,4 +1,4 @@
-"""What the head of a log says, without reading the rest."""
+"""Identity and settings of a log from its head, without reading the rest."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""What a log lost, as records: every range with its place, length, seconds, frames and cause."""
+"""Losses of a log as records: every range with its place, length, seconds, frames and cause."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-# cause -> what it means to a reader
+# cause -> explanation for people
 CAUSES = {
     "crc": "blocks with wrong bits",
     "zeroed": "blocks overwritten with zeros",
@@ -110,7 +110,7 @@ class Ledger:
 
     @property
     def ending(self) -> str | None:
-        """What cannot be proven of the log's end, in words; None if its session's end is there."""
+        """The doubt about the log's end, in words; None if the end of its session is in it."""
         if self.received and self.complete != "complete":
             return "received from the radio, some of the frames: the card has all of them"
         if self.unproven_bytes is None:

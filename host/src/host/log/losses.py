@@ -1,4 +1,4 @@
-"""Finds what a log lost by comparing counters, block numbers and bytes (protocol/README.md)."""
+"""Find losses of a log by comparing counters, block numbers and bytes (protocol/README.md)."""
 
 from __future__ import annotations
 
@@ -164,7 +164,7 @@ def _gaps(scan: Scan, selection: Selection, store: FrameStore, *, whole: bool) -
 
 
 class _Look:
-    """Says what stands in a file where blocks are missing."""
+    """Finds the content of a file where blocks are missing."""
 
     def __init__(self, scan: Scan, blocks: Blocks, file: FileIO) -> None:
         self._positions = scan.blocks.position

@@ -18,7 +18,7 @@ from host.wire.schema import Frame
 
 Array = NDArray[np.float64]
 
-STUCK_S = 10.0  # an ADC sum of four that does not move one count for so long reads no sensor
+STUCK_S = 10.0  # noise moves a live sensor's sum of four conversions by a count sooner than that
 _ADC_END = 4 * 1023
 _JITTER_MOST_US = 1_000_000
 _DRIVEN = ("elevator", "aileron", "rudder", "throttle")
@@ -62,7 +62,7 @@ class PairHealth:
     """
 
     unit: str
-    limit: float  # three standard deviations of both zeros
+    limit: float  # largest honest mean: three standard deviations of both zeros together
     rows: int = 0
     total: float = 0.0
     squares: float = 0.0

@@ -1,8 +1,8 @@
-"""Servo pulses that leave and come back at once while the stick stands still.
+"""Find servo pulses that jump and return within 0.15 s while the stick stands still.
 
-The thesis's servos twitched about once in ten seconds with nobody at the stick (5.1.4). What counts
-is a pulse that is back within 0.15 s. A test input that the recorder flies moves servos without the
-stick too, a multisine as fast: who counts leaves its time out.
+The thesis's servos twitched about once in ten seconds with nobody at the stick (5.1.4). Test
+inputs that the recorder flies also move servos without the stick, a multisine as fast, so the
+caller leaves their time out.
 """
 
 from __future__ import annotations

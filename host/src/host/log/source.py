@@ -1,4 +1,4 @@
-"""What a user points at: a file, a folder or a mounted card."""
+"""Find logs in what a user names: a file, a folder or a mounted card."""
 
 from __future__ import annotations
 

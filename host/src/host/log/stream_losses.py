@@ -1,4 +1,4 @@
-"""What did not arrive of a telemetry stream, from times and places of its frames.
+"""Losses of a telemetry stream, from times and places of its frames.
 
 The radio carries every n-th identification frame: what decimation skips is no loss. A loss is a
 time between two of them that is longer than one and a half times the usual one.

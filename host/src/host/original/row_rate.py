@@ -1,8 +1,8 @@
-"""How many rows a second: as told, or estimated from the way GPS saw against the speed it saw.
+"""Rows per second: as given, or estimated from GPS positions and ground speed.
 
-A row carries no time. Over a stretch of rows the way between two positions is the sum of the ground
-velocities times the time of a row; least squares over stretches gives that time, and what the
-stretches differ by its uncertainty.
+A row carries no time. Over a stretch of rows the distance between two positions is the sum of the
+ground velocities times the time of a row. Least squares over stretches gives that time, and the
+scatter between stretches its uncertainty.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ GIVEN, GPS, UNKNOWN = "given", "GPS", "unknown"
 SEGMENTS = 8
 FEWEST_ROWS = 10  # of a stretch: a GPS of the time says something new every fourth row
 LEAST_WAY_M = 20.0  # of a stretch, in the mean: positions are printed to 1 m
-MOST_SHARE = 0.15  # half-width over rate from which on it tells no time
-SLOWEST_MPS = 2.0  # course of less is noise
+MOST_SHARE = 0.15  # largest relative half-width with which a rate still serves as a time base
+SLOWEST_MPS = 2.0  # below this speed GPS course is noise
 _DEGREE_M = 111_195.0
 
 
 @dataclass(frozen=True, slots=True)
 class RowRate:
-    """Rows per second and who says so.
+    """Rows per second and their origin.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ def row_rate(rows: OriginalRows, given_hz: float | None) -> RowRate:
 
 
 def _ways(rows: OriginalRows) -> tuple[Array, Array] | None:
-    """Return of each stretch the way (m) and the sum of velocities over its rows (m/s), (k, 2)."""
+    """Return the distance (m) and the summed velocity (m/s) of each stretch, (k, 2) each."""
     wanted = ("fix", "lat", "lon", "gpsgc", "gpsgs")
     if any(label not in rows.values for label in wanted):
         return None

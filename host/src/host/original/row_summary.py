@@ -1,4 +1,4 @@
-"""What `host decode` says of a file of original ASCII rows."""
+"""The summary of `host decode` for a file of original ASCII rows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Original rows -> the synchronous table, with their known faults undone or marked invalid."""
+"""Turn original rows into the synchronous table; known faults are corrected or marked invalid."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class RowTable:
     columns : dict of str to NDArray, shape (n,)
         The columns of `host.physical.columns.COLUMNS`; NaN where the rows have nothing.
     rate : RowRate
-        What ``t_s`` rests on; NaN where nobody knows it.
+        Rate from which ``t_s`` is computed; NaN if unknown.
     undone : dict of str to int
         By label, values whose int16 overflow was undone.
     ambiguous : dict of str to int

@@ -37,7 +37,7 @@ VARIANTS: dict[str, tuple[str, ...]] = {
         *("lat", "lon", "gpsgc", "gpsgs", *_END, "rdrs", "throts"),
     ),
 }
-# What tells them apart for a person: sensors of the first flight, and the pairs of the second.
+# Descriptions of the variants for people.
 LAYOUTS = {
     "27 readings": "single sensors and surface pots, the first flight's",
     "23 readings": "single sensors, the first flight's",
@@ -115,7 +115,8 @@ def read_rows(path: Path) -> OriginalRows:
 
 def parse_rows(data: bytes, name: str = "rows") -> OriginalRows:
     """Parse original rows; see `read_rows`."""
-    # Twice: what all rows have in common first, so that no row is held but as numbers.
+    # Two passes: the first finds what all rows have in common, so that the second keeps only
+    # numbers.
     count, seen = 0, Counter[str]()
     digits_of: dict[str, Counter[int]] = {}
     for row in _rows(data):

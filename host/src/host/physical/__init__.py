@@ -1,1 +1,1 @@
-"""Frames to a table in SI: calibration, instants, air data."""
+"""From frames to a table in SI: calibration, sampling instants, air data."""

@@ -57,7 +57,7 @@ class Line:
     source : str
         Where the numbers come from.
     default : bool
-        True if nobody measured them on this instrument.
+        True for numbers that were not measured on this instrument.
     curve : tuple of float
         Per unit of the value, per its square; empty: a line.
     """
@@ -92,8 +92,8 @@ class Calibration:
     lines : dict of str to Line
         By table and channel: ``channel.alpha_a``, ``pulse.elevator``, ``imu.gyro``, ...
     errors : dict
-        Tables [error.NAME] as they stand: what the instrument may be wrong by beside its lines
-        (`host.instrument` reads them).
+        Tables [error.NAME], unread: errors of the instrument beyond its lines (`host.instrument`
+        reads them).
     """
 
     name: str
@@ -142,7 +142,7 @@ def calibration_of_text(text: str, path: Path) -> Calibration:
 
 
 def _completed(own: Calibration, path: Path | str) -> Calibration:
-    """Return a calibration with what it does not name from the default."""
+    """Return a calibration whose missing lines are the default's."""
     default = _read(resource("default.toml"))
     unknown = sorted(set(own.lines) - set(default.lines))
     if unknown:

@@ -106,7 +106,7 @@ PULSES = {
         "rc_switch",
     )
 }
-# What a log holds without deriving anything: every measured column of the identification frame.
+# Measured columns of the identification frame, nothing derived.
 CHANNELS = (
     "t_s",
     *(column for column, _ in ANALOGUE.values()),
@@ -114,7 +114,7 @@ CHANNELS = (
     *ATTITUDE.values(),
     *PULSES.values(),
 )
-# Columns made of others: which lines of the calibration they rest on.
+# Derived columns -> lines of the calibration that they depend on.
 RESTS_ON = {
     "alpha_rad": ("channel.alpha_a", "channel.alpha_b"),
     "beta_rad": ("channel.beta_a", "channel.beta_b"),

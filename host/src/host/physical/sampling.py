@@ -1,4 +1,4 @@
-"""Values known at their own sampling instants -> values at the instant of the row.
+"""Interpolate values from their sampling instants to the instants of the rows.
 
 Linear between the two samples around the instant; no value where one of the two is invalid, or
 where they lie further apart than 1.5 times the usual interval (a sample between them is missing).
@@ -165,7 +165,8 @@ class ConstantDelay:
 
 
 def bend(sampled: Array, values: Array, index: NDArray[np.intp], weight: Array) -> Array:
-    """Return what a cubic through the four samples around adds to the line between two of them.
+    """Return the difference between a cubic through four samples and the line between the inner
+    two.
 
     Where the samples are uneven or one has no value the parabola through three, else nothing.
 

@@ -113,7 +113,7 @@ class Session:
         return frame_times_us(self.store.blocks, self.block_us, frames)
 
     def _rate_hz(self, first: FrameSet) -> float:
-        # The settings say what was asked for; the frames show it, whatever a setting says.
+        # Settings state the wanted rate; the frames show the real one.
         t_us = self._times(first)
         count: NDArray[np.int64] = first.data["count"].astype(np.int64)
         turns = (count[1:] - count[:-1]) & 0xFFFF

@@ -33,7 +33,7 @@ _GPS = {
     "v_down": "v_down_mps",
     "ground_speed": "ground_speed_mps",
 }
-# What the BMP085 can measure (its datasheet, table 1); anything else is a fault, not air.
+# Range of the BMP085 (its datasheet, table 1); a value outside comes from a fault.
 _STATIC_PA = (30_000.0, 110_000.0)
 _TEMPERATURE_K = (233.15, 358.15)
 # surface -> (its pot column, its pulse channel); aileron is made of two pots

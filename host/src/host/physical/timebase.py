@@ -17,7 +17,7 @@ WRAP_US = 1 << 32
 _SCALE_LIMIT = 0.02  # a ceramic resonator is good to 0.5 %; more than 2 % is no clock
 _MIN_FIXES = 20
 _MIN_SPAN_S = 20.0
-_MAX_HALF_WIDTH = 500e-6  # wider than this a correction says less than the resonator's own 0.5 %
+_MAX_HALF_WIDTH = 500e-6  # a fit with a wider interval is not used
 _CONVERGED = 1e-9  # of the scale: a thousandth of a ppm
 
 
@@ -36,7 +36,7 @@ class ClockFit:
     span_s : float
         Time they span.
     residual_ms : float
-        Standard deviation of what the fit leaves (latency of the receiver).
+        Standard deviation of the residuals (latency of the receiver), s.
     applied : bool
         True if ``t_s`` is corrected by it.
     """

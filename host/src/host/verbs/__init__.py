@@ -1,1 +1,1 @@
-"""One module per verb of the command line: arguments in, printed answer out, no work."""
+"""One module per verb of the command line: each reads arguments and prints the answer."""

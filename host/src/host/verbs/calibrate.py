@@ -49,33 +49,57 @@ def add_parser(subparsers: Any) -> None:
         help="calibration file to write; lines it has of other channels stay",
     )  # fmt: skip
     parser.add_argument("--check", type=Path, metavar="OLD", help="compare with an older file")
-    parser.add_argument("--instrument", default="instrument", metavar="NAME", help="in its name")
-    parser.add_argument("--date", default="", metavar="YYYY-MM-DD", help="today without it")
-    parser.add_argument("--by", default="", metavar="WHO", help="kept with every line")
     parser.add_argument(
-        "--serial", action="append", default=[], metavar="CHANNEL=TEXT", help="kept with the line"
+        "--instrument", default="instrument", metavar="NAME", help="instrument, for the file's name"
     )
-    parser.add_argument("--temperature", type=float, metavar="DEGC", help="kept with the lines")
+    parser.add_argument("--date", default="", metavar="YYYY-MM-DD", help="date (default: today)")
+    parser.add_argument("--by", default="", metavar="WHO", help="name to keep with every line")
     parser.add_argument(
-        "--positions", default="", metavar="LIST", help="of one round, if not those of the plan"
+        "--serial",
+        action="append",
+        default=[],
+        metavar="CHANNEL=TEXT",
+        help="serial number of a sensor",
     )
-    parser.add_argument("--latitude", type=float, metavar="DEG", help="for the local free fall")
+    parser.add_argument("--temperature", type=float, metavar="DEGC", help="air on the bench")
     parser.add_argument(
-        "--density", type=float, metavar="KGPM3", help="of the air on a speed run (default 1.225)"
+        "--positions",
+        default="",
+        metavar="LIST",
+        help="positions of one round (default: the plan's)",
+    )
+    parser.add_argument("--latitude", type=float, metavar="DEG", help="latitude, for local gravity")
+    parser.add_argument(
+        "--density", type=float, metavar="KGPM3", help="air density of a speed run (default 1.225)"
     )
     parser.add_argument(
-        "--turn", type=float, default=3600.0, metavar="DEG", help="of the gyros' turntable"
+        "--turn",
+        type=float,
+        default=3600.0,
+        metavar="DEG",
+        help="angle by which the gyros are turned (default 3600)",
     )
     parser.add_argument(
-        "--was", type=float, metavar="MV", help="reference that the status line was made with"
+        "--was",
+        type=float,
+        metavar="MV",
+        help="reference stored in the board when the status line was read",
     )
     parser.add_argument(
-        "--mass", type=float, nargs=2, metavar=("KG", "SIGMA"), help="what hangs on the threads"
+        "--mass",
+        type=float,
+        nargs=2,
+        metavar=("KG", "SIGMA"),
+        help="mass on the threads, and the scale's deviation",
     )
     parser.add_argument(
-        "--cg-tolerance", type=float, default=0.010, metavar="M", help="of its file (default 0.010)"
+        "--cg-tolerance",
+        type=float,
+        default=0.010,
+        metavar="M",
+        help="CG tolerance for the aircraft file (default 0.010)",
     )
-    parser.add_argument("--picture", type=Path, metavar="SVG", help="beside the file without it")
+    parser.add_argument("--picture", type=Path, metavar="SVG", help="default: beside the file")
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 
@@ -219,7 +243,7 @@ def _watched() -> bool:
 
 
 def _show(line: str) -> None:
-    """Write a question again over itself, with what is read now."""
+    """Write a question again over itself, with the present reading."""
     bare(sys.stderr).write(f"\r{line}\033[K")
     sys.stderr.flush()
 

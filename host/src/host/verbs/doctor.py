@@ -1,4 +1,4 @@
-"""`host doctor`: what is installed, plugged in, kept and set."""
+"""`host doctor`: libraries, ports, caches and settings."""
 
 from __future__ import annotations
 

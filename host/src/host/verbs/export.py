@@ -34,7 +34,9 @@ def add_parser(subparsers: Any) -> None:
                         help="format; repeatable")  # fmt: skip
     parser.add_argument("-o", "--output", type=Path, metavar="PATH",
                         help="file or folder to write; the working folder without it")  # fmt: skip
-    parser.add_argument("--rate", type=float, metavar="HZ", help="of tlog (default 25)")
+    parser.add_argument(
+        "--rate", type=float, metavar="HZ", help="rows a second of tlog (default 25)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

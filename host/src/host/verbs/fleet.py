@@ -28,11 +28,11 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("sources", nargs="*", metavar="SOURCE", help="log, folder, pattern or an"
                         " address that fsspec reads, such as s3://club/2026/**")  # fmt: skip
-    parser.add_argument("--aircraft", metavar="FILE", help="aircraft file of all flights of which"
-                        " the table says no other")  # fmt: skip
-    parser.add_argument("--table", type=Path, metavar="FLEET.csv", help="source or serial to"
-                        " aircraft, type, file, calibration, map, date; without it a log's folder"
-                        " names its aircraft")  # fmt: skip
+    parser.add_argument("--aircraft", metavar="FILE", help="aircraft file of flights without one"
+                        " in the table")  # fmt: skip
+    parser.add_argument("--table", type=Path, metavar="FLEET.csv", help="assigns sources or"
+                        " serials to aircraft, type, file, calibration, map, date; without it a"
+                        " log's folder names its aircraft")  # fmt: skip
     parser.add_argument("-o", "--output", type=Path, metavar="DIR", required=True,
                         help="folder of the dataset and of the report")  # fmt: skip
     parser.add_argument("--model", action="append", metavar="FILE", help="kind 'coefficients', as"
@@ -42,13 +42,13 @@ def add_parser(subparsers: Any) -> None:
                         " repeatable")  # fmt: skip
     parser.add_argument("--workers", type=int, default=0, metavar="N",
                         help="processes on this computer (default: one for each core)")  # fmt: skip
-    parser.add_argument("--scheduler", default="", metavar="ADDRESS", help="of another Dask"
+    parser.add_argument("--scheduler", default="", metavar="ADDRESS", help="another Dask"
                         " cluster, such as tls://lab:8786")  # fmt: skip
     parser.add_argument("--most-seconds", type=float, default=300.0, metavar="S",
-                        help="processor time of a flight (default 300); by the clock six times as"
-                        " much")  # fmt: skip
+                        help="most processor time for a flight (default 300; by the clock six times"
+                        " as much)")  # fmt: skip
     parser.add_argument("--most-memory", type=float, default=3000.0, metavar="MB",
-                        help="memory of a flight (default 3000)")  # fmt: skip
+                        help="most memory for a flight (default 3000)")  # fmt: skip
     parser.add_argument("--retry", action="store_true", help="try flights again that were set"
                         " aside")  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print the type's model as JSON")

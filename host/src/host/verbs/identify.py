@@ -51,10 +51,11 @@ def add_parser(subparsers: Any) -> None:
         help="estimator, repeatable for a side-by-side table; 'list' shows them",
     )
     parser.add_argument("--method-option", action="append", metavar="NAME=VALUE",
-                        help="of hopfield and hopfield-line-search: lambda, rho, iterations, start"
-                        " (least-squares, model, zero); of recursive: forgetting")  # fmt: skip
+                        help="option of hopfield and hopfield-line-search: lambda, rho,"
+                        " iterations, start (least-squares, model, zero); of recursive:"
+                        " forgetting")  # fmt: skip
     parser.add_argument("--history", type=Path, metavar="FILE",
-                        help="write how hopfield or recursive settled, as .csv")  # fmt: skip
+                        help="write the convergence of hopfield or recursive as .csv")  # fmt: skip
     parser.add_argument("--aircraft", metavar="NAME", help="aircraft file: mass, sizes, sensors;"
                         " gives coefficients")  # fmt: skip
     parser.add_argument("--truth", type=Path, metavar="TOML", action=StorePlaced, default=[],
@@ -159,7 +160,7 @@ def _run(args: argparse.Namespace) -> int:
     announce_aircraft([args.aircraft])
     if args.json:
         text = option_words(found.to_json())
-        # What was written is said before the answer, so that no answer follows an error.
+        # Files are written before the answer is printed, so that no answer follows an error.
         _say(found.save(places))
         print(text)
         return int(ExitCode.OK)
@@ -191,7 +192,7 @@ def _places(args: argparse.Namespace) -> OutputPaths:
 
 
 def _say(written: list[Path]) -> None:
-    """Say what was written, pictures by their number."""
+    """Print the files that were written, pictures by their number."""
     pictures = [path for path in written if path.suffix == ".svg"]
     parts = [str(path) for path in written if path not in pictures]
     if pictures:

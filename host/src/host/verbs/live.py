@@ -39,43 +39,42 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("source", nargs="?", metavar="SOURCE", help="see above")
     parser.add_argument("-o", "--output", type=Path, metavar="PATH",
-                        help="capture's file or folder; the working folder without it,"
-                        " of a replay none")  # fmt: skip
+                        help="capture's file or folder (default: the working folder; of a"
+                        " replay no capture)")  # fmt: skip
     parser.add_argument("--calibration", type=Path, metavar="FILE",
                         help="counts to SI; a copy goes into the capture's head")  # fmt: skip
     parser.add_argument("--aircraft", metavar="NAME",
                         help="name or file of the aircraft: its derivatives are estimated while it"
                         " flies")  # fmt: skip
     parser.add_argument("--wanted", metavar="PERCENT",
-                        help="half-widths that are enough, per cent of each value: 8, or"
+                        help="half-widths to reach, per cent of each value: 8, or"
                         " Cm_q=15,Cn_r=25 (default 10 to 20)")  # fmt: skip
     parser.add_argument("--baud", type=_whole, metavar="N",
-                        help="of the port (the radio's 57600, a Mega's USB 115200)")  # fmt: skip
+                        help="baud rate (default: radio 57600, a Mega's USB 115200)")  # fmt: skip
     parser.add_argument("--rate", type=_rate, default=20.0, metavar="HZ",
-                        help="rows a second of a replay, as far as it has them (default 20, as the"
-                        " radio)")  # fmt: skip
+                        help="most rows a second of a replay (default 20: a radio's)")  # fmt: skip
     parser.add_argument("--port", type=_whole, metavar="N",
-                        help="of the page; the first free one from 8050 without it")  # fmt: skip
+                        help="TCP port of the page (default: first free from 8050)")  # fmt: skip
     parser.add_argument("--lan", action="store_true",
                         help="let others in this network look, by the address it"
                         " prints")  # fmt: skip
     parser.add_argument("--no-page", action="store_true",
                         help="capture only; ends with a replay's end")  # fmt: skip
     parser.add_argument("--mavlink", metavar="udpout:HOST:PORT",
-                        help="tell a ground station: QGroundControl, Mission Planner,"
+                        help="send to a ground station: QGroundControl, Mission Planner,"
                         " MAVProxy")  # fmt: skip
     parser.add_argument("--plotjuggler", metavar="udpout:HOST:PORT", nargs="?",
                         const="udpout:127.0.0.1:9870",
-                        help="rows as JSON datagrams for PlotJuggler's UDP server; to its own port"
-                        " on this computer without a value")  # fmt: skip
+                        help="send rows as JSON datagrams to PlotJuggler's UDP server (default:"
+                        " on this computer)")  # fmt: skip
     parser.add_argument("--preflight", type=Path, metavar="SHEET",
-                        help="what `host preflight` wrote: its GO or NO-GO on top")  # fmt: skip
+                        help="sheet of `host preflight`: shows its GO or NO-GO")  # fmt: skip
     parser.add_argument("--card", metavar="CARD",
-                        help="that is flown (host plan): each test point gets a verdict, and what"
-                        " is next a countdown")  # fmt: skip
+                        help="card that is flown (host plan): each test point gets a verdict, the"
+                        " next one a countdown")  # fmt: skip
     parser.add_argument("--flight-card", type=Path, metavar="FILE",
-                        help="of sim:CARD (host plan CARD --card FILE): the logger flies its inputs"
-                        " itself, and tells what it learns")  # fmt: skip
+                        help="with sim:CARD: file of host plan CARD --card FILE; the logger flies"
+                        " its inputs and sends what it learns")  # fmt: skip
     parser.add_argument(
         "--json",
         action="store_true",

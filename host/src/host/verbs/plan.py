@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 # A derivative whose predicted half-width is above this is named.
 WEAK_PERCENT = 20.0
 BY_TOLERANCES = "by tolerances, not by the card"
-NO_SIGN_PERCENT = 100.0  # from here on the sign is open too
+NO_SIGN_PERCENT = 100.0  # wider half-widths leave the sign unknown too
 MOST_FLIGHTS = 100
 MOST_GUSTS_MPS = 5.0
 COEFFICIENTS = (
@@ -63,14 +63,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         type=int,
         default=3,
         metavar="N",
-        help="virtual flights that the intervals are the median of (default 3);"
+        help="virtual flights whose median gives the intervals (default 3);"
         " 0: only the bounds of white noise in calm air, at once",
     )
     parser.add_argument(
         "--alone",
         action="store_true",
-        help="also what each test point tells by itself, which its verdict in flight (host live)"
-        " is measured against",
+        help="print the half-widths of each test point alone too, the reference of its verdict in"
+        " flight (host live)",
     )
     _add_designs(parser)
     parser.add_argument("--save", type=Path, metavar="FILE", help="write the designed card as TOML")
@@ -112,14 +112,14 @@ def _add_designs(parser: argparse.ArgumentParser) -> None:
         "--calibration",
         type=Path,
         metavar="TOML",
-        help="with --card: calibration of the logger; the default one without",
+        help="with --card: calibration of the logger (default: the one of the package)",
     )
     parser.add_argument(
         "--amplitude",
         type=float,
         default=1.0,
         metavar="SHARE",
-        help="with --card: of all deflections, such as 0.33 on first flights (default 1)",
+        help="with --card: factor on all deflections, such as 0.33 on first flights (default 1)",
     )
 
 
@@ -180,7 +180,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check(args: argparse.Namespace) -> None:
-    """Refuse what can be seen to be wrong before anything is designed or flown."""
+    """Refuse wrong arguments before anything is designed or flown."""
     from host.aircraft.aircraft_ranges import AIRSPEED
     from host.sysid.answer.atomic_files import check_destination
 
@@ -201,7 +201,7 @@ def _check(args: argparse.Namespace) -> None:
 
 
 def _optimal(args: argparse.Namespace) -> Card:
-    """Design the card of the least time, and say on stderr what it promises."""
+    """Design the card of the least time; print its predicted half-widths on stderr."""
     from host.aircraft.linear_aircraft import load
     from host.planning.identified_aircraft import identified_range, is_model
     from host.planning.optimal_card import AIRCRAFT, optimal_card, prior_of
@@ -261,7 +261,7 @@ def _write_logger_card(card: Card, args: argparse.Namespace) -> None:
             file=sys.stderr,
         )
     plane = load(card.aircraft)
-    # Of a linear aircraft nobody knows inertia and coefficients apart.
+    # A linear aircraft has accelerations only: its inertia and coefficients cannot be separated.
     learned = [] if plane.straight is not None else learned_axes(card.aircraft, card, calibration)
     envelope = Envelope(amplitude_share=args.amplitude)
     data = logger_card(card, plane, calibration, envelope, learned)

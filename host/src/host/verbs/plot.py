@@ -47,15 +47,17 @@ def add_parser(subparsers: Any) -> None:
         " page has those of test points and 5 s around, and an overview",
     )
     parser.add_argument("--png", type=Path, metavar="FILE", help="write strips as a picture")
-    parser.add_argument("--svg", type=Path, metavar="FILE", help="the same as drawing")
+    parser.add_argument("--svg", type=Path, metavar="FILE", help="write strips as a drawing")
     parser.add_argument(
         "--channels",
         metavar="NAMES",
         default="",
-        help="of the picture, a strip each, such as alpha_deg,q_degps+p_degps",
+        help="strips of the picture, such as alpha_deg,q_degps+p_degps",
     )
-    parser.add_argument("--from", dest="from_s", type=float, metavar="S", help="of the picture")
-    parser.add_argument("--to", dest="to_s", type=float, metavar="S", help="of the picture")
+    parser.add_argument(
+        "--from", dest="from_s", type=float, metavar="S", help="start of the picture"
+    )
+    parser.add_argument("--to", dest="to_s", type=float, metavar="S", help="end of the picture")
 
 
 def wanted_source(args: argparse.Namespace) -> Any:

@@ -40,22 +40,22 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--without", action="append", default=[], metavar="ITEM[=WHY]",
                         help="leave an item out (not fitted); it stands on the sheet; vanes,"
                         " pitots, pots: all of them")  # fmt: skip
-    parser.add_argument("--list", action="store_true", help="print what will be asked, and stop")
+    parser.add_argument("--list", action="store_true", help="print the checks, and stop")
     parser.add_argument("--sheet", type=Path, metavar="TOML",
-                        help="where the sheet goes; beside the capture without it")  # fmt: skip
+                        help="sheet to write (default: beside the capture)")  # fmt: skip
     parser.add_argument("-o", "--output", type=Path, metavar="PATH",
-                        help="capture's file or folder; the working folder without it")  # fmt: skip
+                        help="capture's file or folder (default: the working folder)")  # fmt: skip
     parser.add_argument("--baud", type=int, metavar="N",
-                        help="of the port (57600 of a radio, 115200 of a Mega's USB)")  # fmt: skip
-    parser.add_argument("--port", type=int, metavar="N", help="of the page")
+                        help="baud rate (default: radio 57600, a Mega's USB 115200)")  # fmt: skip
+    parser.add_argument("--port", type=int, metavar="N", help="TCP port of the page")
     parser.add_argument("--lan", action="store_true", help="let others in this network look")
     parser.add_argument("--no-page", action="store_true",
                         help="terminal only; ends behind the last item")  # fmt: skip
     parser.add_argument("--mavlink", metavar="udpout:HOST:PORT",
-                        help="tell a ground station; GO is its pre-arm check")  # fmt: skip
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of a virtual walk")
+                        help="send to a ground station; GO is its pre-arm check")  # fmt: skip
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of a virtual walk")
     parser.add_argument("--json", action="store_true",
-                        help="print an object for each change of an item")  # fmt: skip
+                        help="print a JSON object for each change of an item")  # fmt: skip
 
 
 def run(args: argparse.Namespace) -> int:
@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _aircraft(args: argparse.Namespace) -> str:
-    """Return the aircraft's name or file; a virtual walk has one of its own."""
+    """Return the aircraft's name or file; a virtual walk has a default."""
     from host.errors import UsageError
     from host.preflight.preflight_program import PRACTISED, SIMULATED
 
@@ -104,7 +104,7 @@ def _left_out(text: str) -> tuple[str, str]:
 
 
 def _list(args: argparse.Namespace, aircraft: str, without: dict[str, str]) -> int:
-    """Print what will be asked."""
+    """Print the list of checks."""
     import json
 
     from host.aircraft.linear_aircraft import load

@@ -24,7 +24,7 @@ def add_parser(subparsers: Any) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser(
         "report",
-        help="write up what a flight says of the aircraft, in one page to mail",
+        help="write the identification of a flight as one page to mail",
         description=_DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -37,12 +37,12 @@ def add_parser(subparsers: Any) -> None:
         "--output",
         type=Path,
         metavar="HTML",
-        help="page to write; <name>.report.html here without it",
+        help="page to write (default: <name>.report.html in the working folder)",
     )
     parser.add_argument(
         "--aircraft",
         metavar="NAME",
-        help="name or file of the aircraft: gives coefficients and what widens their intervals",
+        help="name or file of the aircraft: gives coefficients and causes of their widths",
     )
     parser.add_argument(
         "--calibration",

@@ -45,10 +45,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--faults", action="store_true",
                         help="list the faults a card can name, and fly nothing")  # fmt: skip
     parser.add_argument("--to", action="append", choices=("ulog", "dataflash", "tlog"), default=[],
-                        help="beside it the log that a PX4 or ArduPilot plane had written of the"
-                        " same flight; repeatable")  # fmt: skip
+                        help="write the log of a PX4 or ArduPilot plane of the same flight too;"
+                        " repeatable")  # fmt: skip
     parser.add_argument("--outputs", choices=("conventional", "elevons", "vtail"),
-                        default="conventional", help="of that plane: how its servos move surfaces"
+                        default="conventional", help="with --to: surfaces of that plane"
                         " (default: conventional)")  # fmt: skip
     parser.add_argument("--no-picture", action="store_true", help="draw nothing")
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")

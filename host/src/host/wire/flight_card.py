@@ -1,4 +1,4 @@
-"""The bytes of a flight card: parts of 48 bytes, what is in them, what makes them good.
+"""The bytes of a flight card: parts of 48 bytes, their fields, their checks.
 
 Layouts and numbers are generated (`protocol/frames.toml`); what a good card is stands in
 protocol/flight-card.md, and the logger asks the same before it makes a card valid.
@@ -30,7 +30,7 @@ TURNS = ("pitch", "roll", "yaw")  # of `card_axis.axis`
 SHAPES = ("pulse", "doublet", "three_two_one_one", "sweep", "multisine")
 # Highest frequency of a shape in units of 1/duration, times 100000 (flight-card.md).
 FREQUENCY = {"pulse": 50_000, "doublet": 100_000, "three_two_one_one": 350_000}
-MOST_SHARES = 252  # of an axis; each is of 64
+MOST_SHARES = 252  # largest sum of the tones' shares on an axis; a share is in 64ths
 TRAVEL_US = (800, 2200)
 NONE = 255
 # Of an axis that is learned: firmware/core/learning/axis_card.h.
@@ -39,7 +39,7 @@ YAW, PITCH_SIGNALS, MOST_SIGNALS, MOST_SUMS = 2, 3, 5, 30
 
 @dataclass(frozen=True, slots=True)
 class CardFile:
-    """A card in numbers: `head` and each of `rows` by field name, raw; what each row teaches."""
+    """A card as raw numbers by field name, and the axes learned while it is flown."""
 
     head: dict[str, Any]
     rows: tuple[dict[str, Any], ...]
@@ -164,7 +164,7 @@ def _numbers(layout: str, data: bytes) -> dict[str, Any]:
 
 
 def card_faults(data: bytes) -> list[str]:
-    """Return in words what makes a card no good; nothing of a good one.
+    """Return the faults of a card in words; a good card has none.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from host.resources import resource
 from host.wire.schema import Field
 
-CRC = "crc"  # a field of this name closes a packet: CRC-16/CCITT-FALSE over all before it
+CRC = "crc"  # name of a packet's last field: CRC-16/CCITT-FALSE over all bytes before it
 
 
 @dataclass(frozen=True)

@@ -89,7 +89,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Schema:
-    """All frames of one released format, as `host.wire.schema_text.parse_schema` lets them in."""
+    """All frames of one released format, checked by `host.wire.schema_text.parse_schema`."""
 
     text: bytes
     frames: tuple[Frame, ...]

@@ -1,7 +1,7 @@
-"""The door for a schema: text from a log -> `Schema`, every name and number checked, once.
+"""Parse the schema text of a log; every name and number is checked here, and only here.
 
-A log is a stranger's file. Its names become columns and file names, its numbers sizes and shifts:
-what passes here may be used without another look. The limits are those of protocol/generator.
+A log may come from anybody. Its names become columns and file names, its numbers sizes and shifts,
+so they are used unchecked after this. The limits are those of protocol/generator.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ def _field(value: Mapping[str, Any]) -> Field:
 
 
 def _check_what_is_read(schema: Schema) -> None:
-    """Refuse a schema without the fields and words that the table is made of."""
+    """Refuse a schema without the fields and words that the table needs."""
     for name, wanted in (*READ_FIELDS.items(), *READ_IF_THERE.items()):
         if name not in schema.by_name:
             if name in READ_IF_THERE:

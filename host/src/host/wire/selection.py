@@ -48,7 +48,7 @@ class Selection:
     sessions : tuple of int
         Sessions of this log, in the order in which they were recorded.
     foreign : tuple of Foreign
-        What else the file holds, in the order of position.
+        Blocks of other logs in the file, in the order of position.
     duplicates : int
         Blocks that stand in the file more than once, beyond the first copy.
     displaced : int

@@ -1,7 +1,7 @@
-"""A captured telemetry stream -> the frames that a receiver of it had, in the order of arrival.
+"""Turn a captured telemetry stream into frames, in the order of arrival.
 
-Each good envelope stands for a block of one frame, so that clock, sessions and table are those of a
-log of blocks. What the stream lacks (file, sequence) is zero or counted.
+Each good envelope becomes a block of one frame, so that clock, sessions and table work as for a
+log of blocks. File ids, which a stream lacks, are zero, and sequence numbers are counted.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def read_stream(path: Path, *, texts: Collection[bytes] = (), limit_bytes: int =
     length = octets[place + 2]
     kind = octets[place + HEAD_BYTES]
     hashes = _hashes(data, place, length, kind)
-    # Cut off before its first hash, which comes every 5 s: the head of the capture knows.
+    # Without a schema hash, which comes every 5 s, the schema is that of the capture's head.
     first_hash = zlib.crc32(next(iter(texts))) if texts else 0
     which = _schema_of(hashes, len(place), first_hash)
     known = _known(path, which, texts)
@@ -358,7 +358,7 @@ def _bad(place: NDArray[np.int64], length: NDArray[np.uint8], size: int) -> list
     """Return the ranges between envelopes; what is cut at either end is none."""
     if not len(place):
         return []
-    # Whoever begins to listen hears the rest of an envelope first, and whoever ends, half of one.
+    # A capture may begin and end in the middle of an envelope.
     longest = _ENVELOPE + LONGEST_FRAME
     bad = [(0, int(place[0]))] if place[0] >= longest else []
     room = np.diff(place)

@@ -1,4 +1,4 @@
-"""CRC-32 of a block's length from any byte on, for every byte of a stretch at the cost of one pass.
+"""Find blocks with a valid CRC-32 at any byte of a stretch, in one pass.
 
 A CRC is linear: what a byte adds to it depends on the byte and on its distance to the end. Summed
 (xor) from the left in chunks of 512 bytes, two sums give any window. A forged megabyte with 150 000
