@@ -79,13 +79,13 @@ def test_outputs_at_10_hz_name_the_parameter(px4: AutopilotLog) -> None:
     assert judged(px4).refusal == ""
 
 
-def test_without_airspeed_what_needs_none_is_told(px4: AutopilotLog) -> None:
+def test_without_airspeed_roll_stays_identifiable(px4: AutopilotLog) -> None:
     messages = {k: v for k, v in px4.messages.items() if k != "airspeed_validated"}
     found = judged(replace(px4, messages=messages))
     answers = dict(found.answers)
-    assert answers["roll: L_p, L_da"] == "can be told, no vanes: without GPS never under trust"
+    assert answers["roll: L_p, L_da"] == "identifiable, no vanes: without GPS never under trust"
     short = next(v for k, v in answers.items() if k.startswith("short period"))
-    assert short == "cannot be told: airspeed not in the log"
+    assert short == "not identifiable: airspeed not in the log"
     assert any("SYS_HAS_NUM_ASPD" in one for one in found.settings)
 
 
@@ -100,9 +100,9 @@ def test_synthetic_airspeed_is_no_sensor(px4: AutopilotLog) -> None:
 def test_an_answer_without_vanes_says_so(px4: AutopilotLog) -> None:
     answers = dict(judged(px4).answers)
     drag = next(v for k, v in answers.items() if k.startswith("speed, drag"))
-    assert drag == "cannot be told without vanes: no angle of attack was measured"
+    assert drag == "not identifiable without vanes: no angle of attack was measured"
     short = next(v for k, v in answers.items() if k.startswith("short"))
-    assert short == "can be told, no vanes: by the path that GPS tells"
+    assert short == "identifiable, no vanes: flow angles from the GPS path"
 
 
 def test_a_plane_that_stays_on_the_ground(px4: AutopilotLog) -> None:

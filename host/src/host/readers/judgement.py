@@ -25,7 +25,7 @@ GROUPS = {
     "surfaces": ("elevator", "aileron", "rudder"),
     "airspeed": ("airspeed_mps",),
 }
-# What can be told, and the channels without which it cannot.
+# Groups of derivatives, and the channels that each needs.
 ANSWERS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("roll: L_p, L_da", ("p_radps", "phi_rad", "aileron")),
     ("short period: Z_alpha, M_alpha, M_q, M_de, by q and az",
@@ -150,14 +150,14 @@ def _refusal(log: AutopilotLog, flown: Airborne, missing: Sequence[str]) -> str:
 def _verdict(needs: Sequence[str], rates: Mapping[str, float], poor: Sequence[str]) -> str:
     angles = [ANGLES[n] for n in needs if n in ANGLES and n not in rates]
     if angles:
-        return f"cannot be told without vanes: no {' and no '.join(angles)} was measured"
+        return f"not identifiable without vanes: no {' and no '.join(angles)} was measured"
     gone = [n for n in needs if n not in rates]
     if gone:
-        return f"cannot be told: {', '.join(n.rsplit('_', 1)[0] for n in gone)} not in the log"
+        return f"not identifiable: {', '.join(n.rsplit('_', 1)[0] for n in gone)} not in the log"
     slow = [g for g in poor if set(GROUPS[g]) & set(needs)]
     path = {"v_north_mps", "airspeed_mps"} <= rates.keys()
-    how = "by the path that GPS tells" if path else "without GPS never under trust"
-    possible = "can be told" + ("" if "alpha_rad" in rates else f", no vanes: {how}")
+    how = "flow angles from the GPS path" if path else "without GPS never under trust"
+    possible = "identifiable" + ("" if "alpha_rad" in rates else f", no vanes: {how}")
     return f"poorly: {', '.join(slow)} too slow" if slow else possible
 
 
