@@ -62,6 +62,13 @@ def add_parser(subparsers: Any) -> None:
         help="serial number of a sensor",
     )
     parser.add_argument("--temperature", type=float, metavar="DEGC", help="air on the bench")
+    _add_bench_options(parser)
+    parser.add_argument("--picture", type=Path, metavar="SVG", help="default: beside the file")
+    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+
+
+def _add_bench_options(parser: argparse.ArgumentParser) -> None:
+    """Add what the bench set: positions, gravity, air, turns, masses."""
     parser.add_argument(
         "--positions",
         default="",
@@ -99,8 +106,6 @@ def add_parser(subparsers: Any) -> None:
         metavar="M",
         help="CG tolerance for the aircraft file (default 0.010)",
     )
-    parser.add_argument("--picture", type=Path, metavar="SVG", help="default: beside the file")
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
