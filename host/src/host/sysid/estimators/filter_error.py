@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,10 +22,11 @@ from host.sysid.numerics.filter_scoring import (
     total_information,
     whitened_innovation_sensitivities,
 )
-from host.sysid.numerics.gauss_newton import gauss_newton
+from host.sysid.numerics.gauss_newton import GaussNewtonResult, damped_step, gauss_newton
 from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.maneuver_agreement import maneuver_influence
 from host.sysid.numerics.output_error import minimise
+from host.sysid.numerics.restricted_likelihood import half_log_determinants, restricted_slopes
 
 MAX_ITERATIONS = 60
 NEAR_BOUNDS = 0.2  # Cramer-Rao bounds: a search that still creeps by so little has ended
@@ -40,6 +42,7 @@ def fit_filter_error(
     roughly: bool = False,
     compare_noise: bool = True,
     hac: bool = False,
+    restricted: bool = False,
 ) -> FitResult:
     """Fit by filter error.
 
@@ -63,6 +66,9 @@ def fit_filter_error(
         Ask whether coloured measurement noise explains the data better (`compare_noise_models`).
     hac : bool
         Inflate standard errors by the autocorrelation of the scores (`hac_inflation`).
+    restricted : bool
+        Take one step on to the optimum of the restricted likelihood (`restricted_likelihood`):
+        what the constants of short maneuvers take of slow noise biases nothing then.
 
     Raises
     ------
@@ -89,8 +95,11 @@ def fit_filter_error(
     found = gauss_newton(objective, theta, max_iterations=MAX_ITERATIONS, **ends)
     if found is None:
         raise IdentificationError(f"model {model.name}: the Kalman filter fails at the start")
-    theta, point = found.theta, found.trial
     covariance = covariance_from_information(found.information)
+    slopes: Array = np.zeros((len(maneuvers), len(theta)))
+    if restricted:
+        found, slopes = _restricted(problem, objective, found, covariance)
+    theta, point = found.theta, found.trial
     factor: Array = np.ones(len(theta))
     if hac:
         white = [
@@ -128,7 +137,9 @@ def fit_filter_error(
             "hac_inflation": factor,
             "process_deviation": np.exp(theta[n_model : n_model + len(process)]),
             "noise_deviation": np.exp(theta[n_model + len(process) :]),
-            **maneuver_influence(objective.parts, objective.scores, covariance),
+            **maneuver_influence(
+                objective.parts, list(np.array(objective.scores) - slopes), covariance
+            ),
         },
     )
     return compare_noise_models(result, maneuvers, first) if compare_noise else result
@@ -163,6 +174,29 @@ def information_at(
         raise IdentificationError(f"model {model.name}: the Kalman filter fails at these values")
     parts, scores = fisher_scoring(problem, theta, point)
     return total_information(problem.output_problem, theta, parts, scores)[0]
+
+
+def _restricted(
+    problem: FilterProblem,
+    objective: _FilterError,
+    found: GaussNewtonResult[InnovationLikelihood],
+    covariance: Array,
+) -> tuple[GaussNewtonResult[InnovationLikelihood], Array]:
+    """Return the search one step on, and what the constants add to the slopes of each maneuver.
+
+    One step does: three more moved L_p by 0.3 % where air rolls. As it was where none is better.
+    """
+    bounds = np.where(found.free, np.sqrt(np.diag(covariance)), 0.0)
+    slopes = restricted_slopes(problem, found.theta, bounds)
+    step, _ = damped_step(found.information, -slopes.sum(axis=0), found.free, 0.0)
+    theta = objective.apply_step(found.theta, step)
+    trial = objective.evaluate(theta)
+    if trial is None:
+        return found, np.zeros_like(slopes)
+    gain = half_log_determinants(problem, found.theta) - half_log_determinants(problem, theta)
+    if not found.trial.cost - trial.cost + float(np.nansum(gain)) > 0.0:
+        return found, np.zeros_like(slopes)
+    return replace(found, theta=theta, trial=trial), slopes
 
 
 def _first_guess(problem: FilterProblem, first: Array, *, fit_first: bool) -> Array:

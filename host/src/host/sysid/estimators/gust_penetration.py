@@ -26,9 +26,8 @@ TURNED = (("alpha_rad", "q_radps"), ("beta_rad", "r_radps"))  # angles and the r
 ROLL_STATES = frozenset({"beta_rad", "p_radps"})  # of a model that air may roll
 # The air turns within the time to fly this far: tail arm or 4 b/pi of models of 1.2 to 2.5 m span.
 LENGTH_M, LENGTH_SHARE = 1.5, 0.5
-# Of the lag, one deviation: beside constants of every short maneuver it came out 10 % quick on
-# flights of an independent simulator, L_p 8 and L_da 5 % small, held in 24 and 26 of 31; of one
-# long record it did not.
+# Of the lag, one deviation: on 29 flights of an independent simulator it came out 5 +- 3 % quick.
+# Without it L_p of others' tables held in 15 of 18 flights, with it in 17.
 ROLL_FORM_SHARE = 0.10
 FARTHEST = 10.0  # times more or less: bounds of the search
 GENEROUS = 2.0  # deviations of the effect, in effects of the same rate and angle of the aircraft

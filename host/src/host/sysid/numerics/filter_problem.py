@@ -105,6 +105,7 @@ class FilterProblem:
         self.output_problem = OutputProblem(model, maneuvers)
         self.model = model
         self.maneuvers = tuple(maneuvers)
+        self.periods_s = _periods_s([m.dt_s for m in maneuvers])
         self.process = process
         self.process_index = [model.states.index(s) for s in process]
         self.n_model = len(self.output_problem.names)
@@ -172,15 +173,13 @@ class FilterProblem:
             step, _ = discretise(
                 AB, n, m, model.hold == "foh", maneuver.dt_s, none, none, none, np.zeros(0), 0
             )
-            if maneuver.dt_s not in gains:
-                # Rounding of the clock gives one sample period several values.
-                near = [t for t in gains if abs(t - maneuver.dt_s) < SAME_PERIOD * t]
-                gain = gains[near[0]] if near else None
-                gain = gain or _steady_state_filter(A, C, intensity, np.diag(power), maneuver.dt_s)
-                if gain is None:
-                    return None
-                gains[maneuver.dt_s] = gain
-            gain = gains[maneuver.dt_s]
+            period_s = self.periods_s[number]
+            gain = gains.get(period_s) or steady_state_filter(
+                A, C, intensity, np.diag(power), period_s
+            )
+            if gain is None:
+                return None
+            gains[period_s] = gains[maneuver.dt_s] = gain
             finite, z = filter_innovations(
                 step, CD, gain.K, self._drives[number], maneuver.outputs, start, bias
             )
@@ -199,12 +198,32 @@ class FilterProblem:
         return likelihood if np.isfinite(cost) else None
 
 
-def _steady_state_filter(
+def _periods_s(steps_s: Sequence[float]) -> list[float]:
+    """Return the sample period of each maneuver: rounding of the clock gives one several values."""
+    found: list[float] = []
+    for step_s in steps_s:
+        near = [t for t in found if abs(t - step_s) < SAME_PERIOD * t]
+        found.append(near[0] if near else step_s)
+    return found
+
+
+def steady_state_filter(
     A: Array, C: Array, intensity: Array, R: Array, dt_s: float
 ) -> SteadyStateFilter | None:
     """Return the filter with P of the Riccati equation, S = C P C' + R and K = P C' S^-1.
 
     EQUATIONS.md, eq. 29. None where none exists.
+
+    Parameters
+    ----------
+    A : Array, shape (n, n)
+    C : Array, shape (p, n)
+    intensity : Array, shape (n,)
+        Spectral density of each state's noise, unit of the state squared per second.
+    R : Array, shape (p, p)
+        Covariance of the measurement noise.
+    dt_s : float
+        Sample period, s.
     """
     F, Qd = discrete_noise(A, intensity, dt_s)
     if not np.isfinite(Qd).all() or np.max(np.abs(F)) > 1e6:
