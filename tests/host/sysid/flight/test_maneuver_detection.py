@@ -110,6 +110,18 @@ def test_the_free_response_ends_where_something_moves() -> None:
     assert second.fit_window()[0] == pytest.approx(39.7, abs=0.1)
 
 
+@pytest.mark.parametrize(("size_deg", "ends"), [(0.9, False), (2.0, True)])
+def test_a_window_ends_at_the_next_input_and_not_at_handling(size_deg: float, ends: bool) -> None:
+    """Small swings of another surface, which begin when the pilot's hands come back."""
+    t = np.arange(0.0, 40.0, 0.01)
+    elevator = 0.09 * (1.0 * ((t >= 10.0) & (t < 11.0)) - 2.0 * ((t >= 10.5) & (t < 11.0)))
+    aileron = multisine(t, 11.5, np.radians(size_deg), 3)
+    doublet, swings = found_in(t, elevator, aileron_rad=aileron)
+    assert (doublet.axis, swings.axis) == ("elevator_rad", "aileron_rad")
+    assert 11.0 < swings.start_s < 13.5
+    assert doublet.end_s == pytest.approx(swings.start_s if ends else 14.0, abs=0.05)
+
+
 def test_a_gap_divides_a_maneuver() -> None:
     t = np.arange(0.0, 60.0, 0.02)
     bridged = ((t > 13.0) & (t < 14.0)).astype(np.float64)

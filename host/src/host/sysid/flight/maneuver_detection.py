@@ -36,6 +36,7 @@ FEWEST = 8  # samples, as a maneuver needs
 SWEEP_LEAD_S = 25.0  # slow swings of a sweep are looked for this far before its first edge
 STEADY_TREND = 0.6  # rank correlation of swing length with order: a sweep's swings shorten
 SWEEP_GAP_S = 1.2  # a 0.15 Hz sine is near its trim no longer than this
+FAINT = 0.2  # of an input: a weaker one of another surface is the pilot's, and ends no response
 RESPONSE_S = 3.0  # the window reaches this long past the last edge
 LEAD_S = 0.3  # of trim before the input, in a fit
 TRIM_S = 1.0  # quiet time before the input
@@ -339,12 +340,7 @@ def _bounded(found: list[DetectedManeuver], last_s: float) -> list[DetectedManeu
         overlaps = [
             k for k in kept if item.start_s < k.input_end_s and k.start_s < item.input_end_s
         ]
-        strength = item.amplitude * (0.3 if item.axis == "throttle" else 1.0)
-        weaker = [
-            k
-            for k in overlaps
-            if k.amplitude * (0.3 if k.axis == "throttle" else 1.0) < 0.5 * strength
-        ]
+        weaker = [k for k in overlaps if _strength(k) < 0.5 * _strength(item)]
         if len(overlaps) > len(weaker):
             stronger = [k for k in overlaps if k not in weaker]
             if any(k.amplitude > 2.0 * item.amplitude for k in stronger):
@@ -353,9 +349,19 @@ def _bounded(found: list[DetectedManeuver], last_s: float) -> list[DetectedManeu
     kept.sort(key=lambda f: f.start_s)
     result = []
     for k, item in enumerate(kept):
-        limit = kept[k + 1].start_s if k + 1 < len(kept) else last_s
+        limit = next((f.start_s for f in kept[k + 1 :] if not _faint_beside(f, item)), last_s)
         result.append(replace(item, end_s=min(item.end_s, max(limit, item.input_end_s), last_s)))
     return result
+
+
+def _faint_beside(other: DetectedManeuver, item: DetectedManeuver) -> bool:
+    """Return whether another surface moves too little to matter in the response to an input."""
+    return other.axis != item.axis and _strength(other) < FAINT * _strength(item)
+
+
+def _strength(item: DetectedManeuver) -> float:
+    """Return the amplitude, that of a throttle as one of a surface."""
+    return item.amplitude * (0.3 if item.axis == "throttle" else 1.0)
 
 
 def _with_logged_windows(
