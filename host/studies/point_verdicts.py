@@ -25,13 +25,14 @@ from host.live.test_point.point_watch import PointWatch
 from host.physical.calibration import calibration_of_text
 from host.planning.card_planning import design
 from host.planning.point_widths import (
+    PointPromise,
+    identify_single_point,
     point_derivatives,
     promise_points,
     single_point_card,
-    single_point_widths,
     test_points,
 )
-from host.planning.predicted_widths import PredictedWidth
+from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.identification_error import IdentificationError
 from host.twin.flight.fly import FlightRecord
 from host.twin.outcome.virtual_calibration import calibration
@@ -46,7 +47,7 @@ from host.wire.framing import EnvelopeReader, envelope
 from studies.stored_rows import flown_rows, seeded_run
 
 AIRCRAFT = "ultrastick25e"
-FIRST_SEED, FLIGHTS = 11240, 260
+FIRST_SEED, FLIGHTS = 14000, 260
 GUSTS_MPS = 0.3
 WITHIN = 1.3  # times the promise
 NEAR = (0.9, 1.15)  # times that: so close, a half-width may be called either way
@@ -74,11 +75,11 @@ def points() -> tuple[Card, tuple[Segment, ...]]:
 
 
 @cache
-def promised(point: Segment) -> tuple[PredictedWidth, ...]:
+def promised(point: Segment) -> PointPromise:
     """Return what a point alone is promised to tell."""
     card, _ = points()
     [found] = promise_points(single_point_card(card, point), GUSTS_MPS, flights=PROMISE_FLIGHTS)
-    return found.widths
+    return found
 
 
 class AtOnce:
@@ -87,9 +88,9 @@ class AtOnce:
     def __init__(self, by: PointEstimator) -> None:
         self._by, self._found = by, PointEstimate()
 
-    def ask(self, point: Segment, data: bytes, last_s: float) -> None:
+    def ask(self, point: Segment, data: bytes, flown: DetectedManeuver) -> None:
         """Estimate."""
-        self._found = self._by.estimate(point, data, last_s)
+        self._found = self._by.estimate(point, data, flown)
 
     def answer(self, timeout_s: float = 0.0) -> PointEstimate | None:
         """Return what was found."""
@@ -152,10 +153,10 @@ def flight(seed: int) -> Iterator[dict[str, object]]:
 def _ratios(flown: Card, table: pd.DataFrame, point: Segment) -> Array:
     """Return the half-widths of the wanted derivatives over the promised ones."""
     try:
-        found = single_point_widths(point, table, flown.aircraft)
+        found = identify_single_point(point, table, flown.aircraft).widths
     except IdentificationError:
         found = {}
-    own = {w.name: w.half_width for w in promised(point)}
+    own = {w.name: w.half_width for w in promised(point).widths}
     widths = [found[n].half_width if n in found else math.inf for n in point_derivatives(point)]
     return np.array(
         [min(w / own[n], NEVER) for n, w in zip(point_derivatives(point), widths, strict=True)]

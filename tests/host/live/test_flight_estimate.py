@@ -6,16 +6,19 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from host.live.estimates import flight_estimate
 from host.live.estimates.estimate_worker import EstimateWorker
 from host.live.estimates.flight_estimate import FlightEstimator
 from host.live.estimates.wanted_widths import WANTED_PERCENT
-from host.live.test_point.point_estimate import PointEstimator
+from host.live.test_point.point_estimate import PointEstimate, PointEstimator
+from host.planning.point_widths import PointPromise, point_derivatives
+from host.planning.predicted_widths import PredictedWidth
 from host.sysid.flight.maneuver_detection import DetectedManeuver, detect_maneuvers
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.identification_error import IdentificationError
-from host.twin.testcard.cards import load
+from host.twin.testcard.cards import Card, load
 from studies.radio_flights import RadioFlight, after_each_point, lost_in_bursts, radio_flight
 
 import host
@@ -84,20 +87,43 @@ def test_the_process_that_estimates_names_the_next_point(
     assert {"Cl_p", "Cn_dr"} <= set(found.next_point.wanting)
 
 
-def test_a_point_alone_is_estimated_from_the_last_seconds(flight: RadioFlight) -> None:
+def test_a_point_alone_is_estimated_with_its_own_residuals_and_with_promised_ones(
+    flight: RadioFlight,
+) -> None:
     card = load("demo")
     point = card.segments[1]
     first, second = after_each_point(flight.sent, flight.truth, 3.8)
+    truth = flight.truth[1]
+    start_s = truth["start_s"] - truth["input_end_s"] - 3.8
+    flown = DetectedManeuver("elevator_rad", "3-2-1-1", start_s, -3.8, -0.8, 0.05, 5)
     by = PointEstimator(card, flight.calibration)
-    last_s = flight.truth[1]["input_end_s"] + 3.8 - flight.truth[1]["start_s"] + 1.0
-    one = by.estimate(point, second, last_s)
-    assert one.promised == ()  # not reckoned yet
-    assert set(one.half_widths) == {"Cm_alpha", "Cm_q", "Cm_de"}
-    # What was flown before the last seconds is another point, and would narrow it.
-    both = by.estimate(point, second, 60.0)
-    assert all(both.half_widths[name] < 0.95 * one.half_widths[name] for name in one.half_widths)
-    assert by.estimate(point, b"noise", last_s).half_widths == {}
-    assert by.estimate(point, first[:3000], last_s).half_widths == {}
+    one = by.estimate(point, second, flown)
+    assert (one.promised, one.expected) == ((), {})  # not reckoned yet
+    assert set(one.measured) == {"Cm_alpha", "Cm_q", "Cm_de"}
+    assert by.estimate(point, b"noise", flown) == PointEstimate()
+    assert by.estimate(point, first[:3000], flown).measured == {}
+    another = replace(flown, axis="rudder_rad")
+    assert by.estimate(point, second, another).measured == {}
+    quiet, loud = (_with_noise(card, flight, second, flown, times) for times in (1.0, 16.0))
+    assert quiet.promised == loud.promised
+    for name, width in quiet.expected.items():
+        assert loud.measured[name] == quiet.measured[name] == one.measured[name]
+        noise = [w.noise_share * w.half_width**2 for w in (width, loud.expected[name])]
+        assert noise[1] == pytest.approx(16.0 * noise[0], rel=0.5)
+
+
+def _with_noise(
+    card: Card, flight: RadioFlight, data: bytes, flown: DetectedManeuver, times: float
+) -> PointEstimate:
+    """Return the estimate of a point whose promise has residuals of so many times a power."""
+    point, grid = card.segments[1], np.linspace(0.1, 4.5, 12)
+    power = {"CL": 1e-4, "CD": 1e-5, "Cm": 1e-6, "Cl": 1e-7, "w": 1e-2, "u": 1e-2}
+    noise = {name: (grid, np.full(12, times * value)) for name, value in power.items()}
+    widths = tuple(
+        PredictedWidth(name, "1", 1.0, 0.1, 0.5, 11) for name in point_derivatives(point)
+    )
+    promise = PointPromise("3211", point.axes, point.amplitudes, 0.2, widths, (), noise=noise)
+    return PointEstimator(card, flight.calibration, {point: promise}).estimate(point, data, flown)
 
 
 def test_a_test_point_under_way_is_in_the_estimate_and_named(

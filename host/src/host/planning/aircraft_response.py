@@ -17,10 +17,12 @@ from scipy.signal import butter, lfilter
 from host.aircraft.air import atmosphere
 from host.aircraft.air import density_kgpm3 as density_at
 from host.aircraft.file import Aircraft
+from host.aircraft.linear_aircraft import load
 from host.aircraft.linearisation import linearise, modes
 from host.aircraft.mode_names import DUTCH_ROLL, SHORT_PERIOD
 from host.aircraft.trim import solve
 from host.arrays import Array
+from host.twin.testcard.cards import Card
 
 STEP_S = 0.01
 # Gusts are slow: motion slower than this share of the mode's frequency drowns in them.
@@ -47,6 +49,11 @@ class AircraftResponse:
     height_m : float
         For the air's density.
 
+    Attributes
+    ----------
+    linear : Linear
+        Its motion about the trim.
+
     Raises
     ------
     TrimError
@@ -57,6 +64,7 @@ class AircraftResponse:
         frame = aircraft.airframe()
         rho = density_at(atmosphere(101325.0, 15.0), height_m)
         linear = linearise(frame, solve(frame, airspeed_mps, density_kgpm3=rho))
+        self.linear = linear
         self.airspeed_mps = airspeed_mps
         self.servo_radps = float(frame.servo_bandwidth_radps)
         self.modes = {mode.name: mode for mode in modes(linear)}
@@ -132,6 +140,19 @@ class AircraftResponse:
             x = lfilter(b, a, x - x[0], axis=0)
             found[row] = np.asarray(x.T @ x * STEP_S)
         return found
+
+
+def card_response(card: Card) -> AircraftResponse:
+    """Return the card's aircraft about the card's trim.
+
+    Raises
+    ------
+    AircraftError, TrimError
+        It cannot be read or trimmed.
+    """
+    aircraft = load(card.aircraft)
+    speed = card.flight.airspeed_mps or aircraft.scalar("trim.airspeed_mps")
+    return AircraftResponse(aircraft, speed, card.flight.height_m)
 
 
 def deviations(names: Sequence[str], information: Mapping[str, Array]) -> Array:

@@ -12,13 +12,14 @@ equation needs an aileron: a rudder alone is told by those of side force and yaw
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
+import numpy as np
 import pandas as pd
 
+from host.arrays import Array
 from host.errors import UsageError
 from host.planning.predicted_widths import (
     FIRST_SEED,
@@ -30,9 +31,11 @@ from host.planning.predicted_widths import (
     flown_columns,
     predict_widths,
 )
-from host.sysid.coefficients.coefficient_estimator import identify_coefficients
+from host.sysid.coefficients.coefficient_estimator import coefficient_estimator
 from host.sysid.coefficients.coefficient_model import CoefficientModel, standard_model
-from host.sysid.flight.maneuver_detection import detect_maneuvers
+from host.sysid.coefficients.window_spectra import ResidualSpectra
+from host.sysid.flight.maneuver_detection import DetectedManeuver, detect_maneuvers
+from host.sysid.flight.reconstructed_flight import reconstruct_flight
 from host.twin.testcard.cards import Card, Segment
 
 # What an input on an axis is flown for: damping, stiffness and control of the mode it excites.
@@ -64,6 +67,8 @@ class PointPromise:
         Why a flight gave no answer.
     recorded : bool
         Flown through the recorder's own program; False where there is no compiler to build it.
+    noise : ResidualSpectra
+        Of the residuals of each equation: geometric means of these flights.
     """
 
     kind: str
@@ -73,6 +78,23 @@ class PointPromise:
     widths: tuple[PredictedWidth, ...]
     failures: tuple[str, ...]
     recorded: bool = True
+    noise: ResidualSpectra = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class SinglePoint:
+    """What the flight of one test point tells.
+
+    Attributes
+    ----------
+    widths : dict of str to FlightWidth
+        Intervals of the derivatives that it is flown for.
+    noise : ResidualSpectra
+        That they were weighted by.
+    """
+
+    widths: dict[str, FlightWidth]
+    noise: ResidualSpectra
 
 
 def test_points(card: Card) -> list[Segment]:
@@ -91,10 +113,14 @@ def point_derivatives(point: Segment) -> tuple[str, ...]:
     return tuple(name for axis in point.axes for name in AXIS_DERIVATIVES[axis])
 
 
-def single_point_widths(
-    point: Segment, table: pd.DataFrame, aircraft: str, last_s: float = math.inf
-) -> dict[str, FlightWidth]:
-    """Return the intervals of the derivatives that one test point is flown for, from its flight.
+def identify_single_point(
+    point: Segment,
+    table: pd.DataFrame,
+    aircraft: str,
+    known: DetectedManeuver | None = None,
+    noise: ResidualSpectra | None = None,
+) -> SinglePoint:
+    """Return what the flight of one test point tells.
 
     Parameters
     ----------
@@ -103,8 +129,10 @@ def single_point_widths(
         As `virtual_flight` returns it.
     aircraft : str
         Name or file.
-    last_s : float
-        The point began in these last seconds of the table: what was flown before is another one.
+    known : DetectedManeuver, optional
+        When its input was flown; without, it is looked for.
+    noise : ResidualSpectra, optional
+        Spectra of the residuals in place of those of this flight.
 
     Raises
     ------
@@ -112,17 +140,19 @@ def single_point_widths(
         No equation can be identified.
     """
     columns, instrument = flown_columns(table, aircraft)
-    since_s = float(columns["t_s"][-1]) - last_s
-    own = [
-        m
-        for m in detect_maneuvers(columns)
-        if m.axis.removesuffix("_rad") in point.axes and m.start_s > since_s
-    ]
-    answer = identify_coefficients(
-        columns, aircraft, windows=own, model=_model_of(point), instrument=instrument
+    own = [known] if known else detect_maneuvers(columns)
+    own = [m for m in own if m.axis.removesuffix("_rad") in point.axes]
+    by = replace(
+        coefficient_estimator(aircraft, model=_model_of(point), instrument=instrument),
+        known_noise=noise,
     )
-    widths = coefficient_widths(answer)
-    return {name: widths[name] for name in point_derivatives(point) if name in widths}
+    estimate = by.estimate([reconstruct_flight(columns, own)])
+    [found], [one] = by.intervals(estimate), estimate
+    widths = coefficient_widths(found)
+    return SinglePoint(
+        {name: widths[name] for name in point_derivatives(point) if name in widths},
+        one.search.final.noise,
+    )
 
 
 def _model_of(point: Segment) -> CoefficientModel:
@@ -177,9 +207,16 @@ def _promised(
     # Through the recorder: without it half-widths of N_r were half of those that its log gives, of
     # L_p four fifths.
     point_card = single_point_card(card, point)
+    spectra: list[ResidualSpectra] = []
+
+    def widths_of(table: pd.DataFrame, aircraft: str) -> dict[str, FlightWidth]:
+        found = identify_single_point(point, table, aircraft)
+        spectra.append(found.noise)
+        return found.widths
+
     fly = partial(
         predict_widths, point_card, gusts_mps, flights=flights, first_seed=first_seed,
-        widths_of=partial(single_point_widths, point), progress=progress,
+        widths_of=widths_of, progress=progress,
     )  # fmt: skip
     try:
         found, recorded = fly(chain="sitl"), True
@@ -188,8 +225,21 @@ def _promised(
     widths = {w.name: w for w in found.widths}
     kept = tuple(widths[name] for name in point_derivatives(point) if name in widths)
     return PointPromise(
-        point.kind, point.axes, point.amplitudes, point.width_s, kept, found.failures, recorded
-    )
+        point.kind, point.axes, point.amplitudes, point.width_s, kept, found.failures, recorded,
+        _mean_spectra(spectra),
+    )  # fmt: skip
+
+
+def _mean_spectra(flights: Sequence[ResidualSpectra]) -> dict[str, tuple[Array, Array]]:
+    """Return the geometric mean of the residual spectra of some flights, by equation."""
+    found: dict[str, list[tuple[Array, Array]]] = {}
+    for spectra in flights:
+        for equation, spectrum in spectra.items():
+            found.setdefault(equation, []).append(spectrum)
+    return {
+        equation: (each[0][0], np.exp(np.mean([np.log(power) for _, power in each], axis=0)))
+        for equation, each in found.items()
+    }
 
 
 def _part(progress: Progress | None, done: int, points: Sequence[Segment]) -> Progress | None:

@@ -21,7 +21,8 @@ from host.arrays import Array
 from host.constants import NORMAL_95
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.sysid.answer.parameter_units import parameter_unit
-from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+from host.sysid.coefficients.coefficient_fit import CoefficientFit
+from host.sysid.coefficients.coefficient_intervals import CoefficientIntervals
 from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.flight.even_grid import even_arrays
 from host.sysid.flight.foreign_tables import from_frame
@@ -185,9 +186,9 @@ def linear_widths(table: pd.DataFrame, aircraft: str) -> dict[str, FlightWidth]:
     return {name: row for answer in answers for name, row in _rows(answer).items()}
 
 
-def coefficient_widths(answer: CoefficientAnswer) -> dict[str, FlightWidth]:
-    """Return every coefficient of an answer, and how much of its variance more data take away."""
-    fit, found = answer.fit, {}
+def coefficient_widths(fit: CoefficientFit | CoefficientIntervals) -> dict[str, FlightWidth]:
+    """Return every coefficient of a fit, and how much of its variance more data take away."""
+    found = {}
     count = len(fit.derivatives)
     errors = fit.covariance[count:, count:]
     for k, d in enumerate(fit.derivatives):

@@ -166,7 +166,7 @@ def run(args: argparse.Namespace) -> int:
                     "bounds": [asdict(bound) for bound in plan.bounds],
                     "refused": plan.refused,
                     "predicted": None if prediction is None else asdict(prediction),
-                    "alone": [asdict(point) for point in alone],
+                    "alone": [_as_json(point) for point in alone],
                 }
             )
         )
@@ -339,6 +339,13 @@ def _single_points(card: Card, args: argparse.Namespace) -> list[PointPromise]:
         progress=lambda share: draw_share("points alone", share),
     )
     bar.clear()
+    return found
+
+
+def _as_json(point: PointPromise) -> dict[str, object]:
+    """Return a promise without its spectra, which nobody reads."""
+    found = asdict(replace(point, noise={}))
+    del found["noise"]
     return found
 
 

@@ -124,7 +124,7 @@ class FlightEstimator:
         widths = {
             name: width
             for answer in answers
-            for name, width in coefficient_widths(answer).items()
+            for name, width in coefficient_widths(answer.fit).items()
             if _AXIS_OF.get(name.rpartition("_")[2], "") in _moved(answer)
         }
         return FlightEstimate(

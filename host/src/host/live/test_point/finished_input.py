@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from host.arrays import Array
+from host.arrays import Array, IntArray
 from host.planning.wanted_input import RESPONSE_S, SURFACES
 from host.sysid.flight.maneuver_detection import (
     FLYING_SHARE,
@@ -53,7 +53,8 @@ def finished_inputs(
     size = math.radians(max((a for a in wanted.amplitudes), default=3.0))
     gain = max(1.0, LEAST_EDGE_RAD / (LEAST_SHARE * size))
     shown = {"t_s": t[since:], "airspeed_mps": columns["airspeed_mps"][since:]}
-    shown |= {f"{axis}_rad": gain * columns[f"{axis}_rad"][since:] for axis in SURFACES}
+    nearest = _nearest_arrived(columns["arrived"])[since:]
+    shown |= {f"{axis}_rad": gain * columns[f"{axis}_rad"][nearest] for axis in SURFACES}
     longest_s = LONGEST * input_s(wanted)
     found = []
     for item in detect_maneuvers(shown):
@@ -70,3 +71,10 @@ def finished_inputs(
             found.append((not own, item))
     # The wanted axis first: beside it others are handling.
     return [item for _, item in sorted(found, key=lambda one: (one[0], one[1].start_s))]
+
+
+def _nearest_arrived(arrived: Array) -> IntArray:
+    """Return for each row the nearest that came: a line over a burst has no edges, a step has."""
+    came = np.flatnonzero(arrived > 0.0)
+    middle = 0.5 * (came[1:] + came[:-1])
+    return np.asarray(came[np.searchsorted(middle, np.arange(len(arrived)))])

@@ -1,38 +1,38 @@
 """What one test point tells, from the rows that the radio brought: by the estimator of its promise.
 
-The same call as for the log of the card, on the last rows received. The 20 rows a second are drawn
-to the rate of the log first: edges of an input fall between two rows, and the finder would cut its
-windows at rows.
+The same call as for the log of the card, on the last rows received, drawn to the rate of the log.
+Twice: weighted by the residuals of these rows, which know this point's gusts and what was missed
+between two rows as well; and by those of the flights of the promise, which know neither.
 """
 
 from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
-from scipy.interpolate import CubicSpline
 
-from host.arrays import Array
 from host.errors import HostError
+from host.live.test_point.between_rows import drawn_rows
 from host.log import read_log
-from host.physical.sampling import GAP_FACTOR
+from host.planning.aircraft_response import AircraftResponse, card_response
 from host.planning.point_widths import (
+    PointPromise,
+    identify_single_point,
     point_derivatives,
     promise_points,
     single_point_card,
-    single_point_widths,
 )
-from host.planning.predicted_widths import LIGHT_GUSTS_MPS, PredictedWidth
-from host.sysid.identification_error import IdentificationError
+from host.planning.predicted_widths import LIGHT_GUSTS_MPS, FlightWidth, PredictedWidth
+from host.sysid.coefficients.window_spectra import ResidualSpectra
+from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.twin.testcard.cards import Card, Segment
 
 PROMISE_FLIGHTS = 11  # half-widths scatter by 8 % from flight to flight
-STEP_S = 0.01
-FEWEST = 30  # rows: 1.5 s of the radio
+BEFORE_S = 3.0  # of trim before the input, from where on the aircraft's motion is followed
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +43,15 @@ class PointEstimate:
     ----------
     promised : tuple of PredictedWidth
         Empty where nobody can say.
-    half_widths : dict of str to float
-        By derivative; empty where an estimator has no answer.
+    measured : dict of str to FlightWidth
+        By derivative, weighted by the residuals of the rows that came; empty without an answer.
+    expected : dict of str to FlightWidth
+        The same with the residuals of the flights of the promise.
     """
 
     promised: tuple[PredictedWidth, ...] = ()
-    half_widths: dict[str, float] = field(default_factory=dict)
+    measured: dict[str, FlightWidth] = field(default_factory=dict)
+    expected: dict[str, FlightWidth] = field(default_factory=dict)
 
 
 class PointEstimator:
@@ -59,7 +62,7 @@ class PointEstimator:
     card : Card
     calibration : str
         TOML, counts to SI.
-    promised : mapping of Segment to tuple of PredictedWidth, optional
+    promised : mapping of Segment to PointPromise, optional
         Promises that are known already.
     """
 
@@ -67,30 +70,69 @@ class PointEstimator:
         self,
         card: Card,
         calibration: str,
-        promised: Mapping[Segment, tuple[PredictedWidth, ...]] | None = None,
+        promised: Mapping[Segment, PointPromise] | None = None,
     ) -> None:
         self._card, self._calibration = card, calibration
-        self._promised = dict(promised or {})
+        self._promised: dict[Segment, PointPromise | None] = dict(promised or {})
 
-    def promise(self, point: Segment) -> tuple[PredictedWidth, ...]:
-        """Return what a point of the card is promised to tell: seconds of work, once."""
+    @cached_property
+    def _response(self) -> AircraftResponse:
+        return card_response(self._card)
+
+    def promise(self, point: Segment) -> PointPromise | None:
+        """Return what a point of the card is promised to tell: seconds of work, once.
+
+        None where nobody can say.
+        """
         if point not in self._promised:
             self._promised[point] = _promised(self._card, point)
         return self._promised[point]
 
-    def estimate(self, point: Segment, data: bytes, last_s: float) -> PointEstimate:
-        """Return what bytes tell of a point that began in their last seconds.
+    def estimate(self, point: Segment, data: bytes, flown: DetectedManeuver) -> PointEstimate:
+        """Return what bytes tell of a point.
 
         Without a promise where that was not reckoned yet.
+
+        Parameters
+        ----------
+        point : Segment
+            The card's.
+        data : bytes
+            Of the radio.
+        flown : DetectedManeuver
+            Its input, in seconds from the last row of `data`: before it they are negative.
         """
-        found: dict[str, float] = {}
+        promise = self._promised.get(point)
         try:
-            table = finer(self._table(data))
-            widths = single_point_widths(point, table, self._card.aircraft, last_s)
-            found = {name: float(width.half_width) for name, width in widths.items()}
+            table = self._table(data)
+            last_s = float(table["t_s"].iloc[-1])
+            known = replace(
+                flown, start_s=last_s + flown.start_s, input_end_s=last_s + flown.input_end_s,
+                end_s=last_s + min(flown.end_s, 0.0),
+            )  # fmt: skip
+            drawn = drawn_rows(table, point, self._response, known.start_s - BEFORE_S)
         except HostError:
-            pass  # too little of it arrived, or nothing moved
-        return PointEstimate(self._promised.get(point, ()), found)
+            return PointEstimate(promise.widths if promise else ())
+        if promise is None:
+            return PointEstimate((), self._widths(point, drawn.by_curves, known, None))
+        return PointEstimate(
+            promise.widths,
+            self._widths(point, drawn.by_curves, known, None),
+            self._widths(point, drawn.by_motion, known, promise.noise),
+        )
+
+    def _widths(
+        self,
+        point: Segment,
+        table: pd.DataFrame,
+        known: DetectedManeuver,
+        noise: ResidualSpectra | None,
+    ) -> dict[str, FlightWidth]:
+        """Return half-widths; none where too little arrived, or nothing moved."""
+        try:
+            return identify_single_point(point, table, self._card.aircraft, known, noise).widths
+        except HostError:
+            return {}
 
     def _table(self, data: bytes) -> pd.DataFrame:
         with tempfile.TemporaryDirectory(prefix="host-point-") as folder:
@@ -100,48 +142,14 @@ class PointEstimator:
             return read_log(recording, calibration=text).table()
 
 
-def _promised(card: Card, point: Segment) -> tuple[PredictedWidth, ...]:
-    """Return the promise; none where it cannot be flown through the recorder, as a log is."""
+def _promised(card: Card, point: Segment) -> PointPromise | None:
+    """Return the promise; None where it cannot be flown through the recorder, as a log is."""
     gusts = card.air.turbulence_mps or LIGHT_GUSTS_MPS
     try:
         found = promise_points(single_point_card(card, point), gusts, flights=PROMISE_FLIGHTS)
     except HostError:
-        return ()
+        return None
     whole = [
         p for p in found if p.recorded and {w.name for w in p.widths} == {*point_derivatives(point)}
     ]
-    return whole[0].widths if whole else ()
-
-
-def finer(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table at the rate of the card's log, curves drawn between its rows.
-
-    Parameters
-    ----------
-    table : DataFrame
-        SI, as `host.read_log(...).table()` returns it.
-
-    Raises
-    ------
-    IdentificationError
-        Too few rows.
-    """
-    if len(table) < FEWEST:
-        raise IdentificationError(f"{len(table)} rows arrived, {FEWEST} are needed")
-    t = table["t_s"].to_numpy(np.float64)
-    at = np.arange(t[0], t[-1], STEP_S)
-    out: dict[str, Array] = {"t_s": at}
-    for name in table.columns.drop("t_s"):
-        values = pd.to_numeric(table[name], errors="coerce").to_numpy(np.float64)
-        known = np.isfinite(values)
-        if known.sum() < FEWEST:
-            continue
-        own, series = t[known], values[known]
-        out[name] = np.interp(at, own, series)
-        gaps = np.diff(own)
-        if known.mean() > 0.5:  # of every row: not those of a slower sensor
-            near = gaps[np.clip(np.searchsorted(own, at) - 1, 0, len(gaps) - 1)]
-            curve = CubicSpline(own, series)(at)
-            even = near < GAP_FACTOR * np.median(gaps)
-            out[name] = np.where(even, curve, out[name])
-    return pd.DataFrame(out)
+    return whole[0] if whole else None

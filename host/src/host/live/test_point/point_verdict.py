@@ -1,15 +1,17 @@
 """The verdict of one test point: its measures in, a score and words for the pilot out.
 
 The score is the half-width that the card promises over the one that is to be expected of what was
-flown, 100 at best. Two things tell what to expect: the movement of the surfaces, and the estimate
-from the rows that the radio brought. The latter knows gusts and the aircraft's answer, the former
-neither the noise of 20 rows a second nor their losses: it is their mean that counts. Which flights
-fixed the constants: `studies/point_verdicts.md`.
+flown, 100 at best. Two estimates from the rows that the radio brought tell what to expect. One is
+weighted by its own residuals: it knows this point's noise, and that of 20 rows a second and of
+lines over losses too. The other takes the residuals of the promise. Their mean counts; where there
+is no estimate, the movement of the surfaces alone. Which flights fixed the constants:
+`studies/point_verdicts.md`.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +20,7 @@ from host.arrays import Array
 from host.live.test_point.point_estimate import PointEstimate
 from host.live.test_point.point_measures import PointMeasures
 from host.planning.point_widths import point_derivatives
+from host.planning.predicted_widths import FlightWidth, PredictedWidth
 from host.twin.testcard.cards import Segment
 
 GOOD = 77  # 1.3 times the promised half-width
@@ -33,10 +36,9 @@ OTHER_SHARE = 0.3
 PILOT = 1.1  # times the deviation of the card's input
 LEAST_DEVIATION = 0.8
 CALM, GUSTS_POWER = 1.4, 0.9
-# Weight of the estimate in the logarithm: over points within 2.6 times the promise it scatters by
-# 11 % of what the card's log gives later, the movement by 17 %.
-WHOLE_SHARE, GAPS_SHARE = 0.7, 0.5
-RADIO_WIDER = 1.05  # than of the card's 100 rows: less is averaged
+# Weight of the estimate by its own residuals in the logarithm, all rows there and some missing.
+WHOLE_SHARE, GAPS_SHARE = 0.65, 0.35
+RADIO_WIDER = 1.06  # than of the card's 100 rows: less is averaged
 WEAK, LOUD = 0.7, 1.5  # of the wanted amplitude
 SHORT, LONG = 0.75, 1.35  # of the wanted length
 ROUND = 1.25  # times the card's deviation: what there is to say where nothing else is wrong
@@ -95,14 +97,16 @@ def judge_point(
         Its promise and what the radio's rows tell.
     """
     estimate = estimate or PointEstimate()
-    moved, estimated = moved_width(measures, wanted, estimate), estimated_width(wanted, estimate)
-    share = _share(measures, moved, estimated)
-    width = moved if estimated is None else moved ** (1.0 - share) * estimated**share
+    moved = moved_width(measures, wanted, estimate)
+    estimated = estimated_width(measures, wanted, estimate)
+    if moved >= UNDETERMINED_RATIO:
+        estimated = None
+    width = moved if estimated is None else estimated
     score = round(min(100.0, 100.0 / width))
     said = _remarks(measures, wanted)
-    if not said and share and score < GOOD:
+    if not said and estimated is not None and score < GOOD:
         said = (f"half-widths {width:.1f} times the promised ones",)
-    return PointVerdict(score, said, share > 0.0)
+    return PointVerdict(score, said, estimated is not None)
 
 
 def moved_width(m: PointMeasures, wanted: Segment, estimate: PointEstimate) -> float:
@@ -128,17 +132,32 @@ def moved_width(m: PointMeasures, wanted: Segment, estimate: PointEstimate) -> f
     return width
 
 
-def estimated_width(wanted: Segment, estimate: PointEstimate) -> float | None:
+def estimated_width(m: PointMeasures, wanted: Segment, estimate: PointEstimate) -> float | None:
     """Return the half-width that the radio's rows gave over the promised one, geometric mean.
 
     None where there is no promise, or no estimate.
     """
-    promised = {w.name: w.half_width for w in estimate.promised}
-    names = point_derivatives(wanted)
-    if not names or not all(n in promised and n in estimate.half_widths for n in names):
+    measured = _mean_ratio(wanted, estimate.promised, estimate.measured)
+    expected = _mean_ratio(wanted, estimate.promised, estimate.expected)
+    if measured is not None and m.gusts > CALM:
+        expected = None  # the promise knows nothing of such air
+    share = GAPS_SHARE if m.lost > 0.0 else WHOLE_SHARE
+    known = [(r, s) for r, s in ((measured, share), (expected, 1.0 - share)) if r is not None]
+    if not known:
         return None
-    ratios = [math.log(estimate.half_widths[n] / promised[n] / RADIO_WIDER) for n in names]
-    return math.exp(float(np.mean(ratios)))
+    total = sum(s for _, s in known)
+    return math.exp(sum(r * s for r, s in known) / total) / RADIO_WIDER
+
+
+def _mean_ratio(
+    wanted: Segment, promised: Sequence[PredictedWidth], widths: Mapping[str, FlightWidth]
+) -> float | None:
+    """Return the mean logarithm of half-widths over the promised ones; None where one lacks."""
+    own = {w.name: w.half_width for w in promised}
+    names = point_derivatives(wanted)
+    if not names or not all(n in own and n in widths for n in names):
+        return None
+    return float(np.mean([math.log(widths[n].half_width / own[n]) for n in names]))
 
 
 def _noise_shares(wanted: Segment, estimate: PointEstimate) -> Array:
@@ -149,18 +168,6 @@ def _noise_shares(wanted: Segment, estimate: PointEstimate) -> Array:
         return np.array([shares[name] for name in names])
     usual = [NOISE_SHARE.get((axis, wanted.kind), OTHER_SHARE) for axis in wanted.axes]
     return np.full(len(names), max(usual))
-
-
-def _share(m: PointMeasures, moved: float, estimated: float | None) -> float:
-    """Return how much the estimate counts, beside the movement.
-
-    A line over rows that are missing makes an estimate wider, so only a narrow one tells then.
-    """
-    if estimated is None or moved >= UNDETERMINED_RATIO:
-        return 0.0
-    if m.lost > 0.0:
-        return GAPS_SHARE if estimated < moved else 0.0
-    return WHOLE_SHARE
 
 
 def _gusty(wanted: Segment) -> float:

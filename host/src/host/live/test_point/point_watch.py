@@ -10,10 +10,9 @@ import itertools
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
-from host.aircraft.linear_aircraft import load
 from host.live.live_sample import LiveUpdate
 from host.live.test_point.card_progress import CardPoint, CardProgress
 from host.live.test_point.finished_input import finished_inputs
@@ -22,7 +21,7 @@ from host.live.test_point.point_measures import PointMeasures, measure
 from host.live.test_point.point_verdict import judge_point
 from host.live.test_point.recent_flight import KEPT_S, RecentFlight
 from host.live.test_point.weak_input import weak_input
-from host.planning.aircraft_response import AircraftResponse
+from host.planning.aircraft_response import card_response
 from host.planning.next_point import INPUT_NAMES
 from host.planning.predicted_widths import LIGHT_GUSTS_MPS
 from host.planning.wanted_input import RESPONSE_S
@@ -31,17 +30,16 @@ from host.twin.testcard.cards import Card, Segment
 
 LOOKED_S = 0.5  # of the stream between two looks: a verdict is that late at most
 EARLY_S, LATE_S = 1.5, 6.0  # of an input, against the countdown
-ANSWER_S = 1.0  # of the computer's clock: an estimate takes a tenth of it
+ANSWER_S = 1.0  # of the computer's clock: an estimate takes a fifth of it
 AHEAD_S = 10.0  # a recording played fast is held here until the answer is there
-EDGE_S = 1.0  # a finder at another rate may place the first edge as much earlier
 _SHOWN = 8
 
 
 class EstimateSource(Protocol):
     """Who estimates a point, somewhere else."""
 
-    def ask(self, point: Segment, data: bytes, last_s: float) -> None:
-        """Ask what bytes tell of a point that began in their last seconds."""
+    def ask(self, point: Segment, data: bytes, flown: DetectedManeuver) -> None:
+        """Ask what bytes tell of a point; its input in seconds from their last row."""
         ...
 
     def answer(self, timeout_s: float = 0.0) -> PointEstimate | None:
@@ -94,12 +92,10 @@ class PointWatch:
         estimates: EstimateSource | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        aircraft = load(card.aircraft)
-        speed = card.flight.airspeed_mps or aircraft.scalar("trim.airspeed_mps")
         self.title = card.title
         self.progress = CardProgress(card)
         self.verdicts: deque[dict[str, Any]] = deque(maxlen=_SHOWN)
-        self._response = AircraftResponse(aircraft, speed, card.flight.height_m)
+        self._response = card_response(card)
         self._gusts_mps = card.air.turbulence_mps or LIGHT_GUSTS_MPS
         self._recent = RecentFlight()
         self._looked_s = self._since_s = float("-inf")
@@ -117,8 +113,11 @@ class PointWatch:
         over = self._over
         if over is not None and over.asked_s is None and self._estimates is not None:
             over.asked_s = self._clock()
-            last_s = now_s - over.item.start_s + EDGE_S
-            self._estimates.ask(over.point.segment, b"".join(d for _, d in self._bytes), last_s)
+            flown = replace(
+                over.item, start_s=over.item.start_s - now_s,
+                input_end_s=over.item.input_end_s - now_s, end_s=over.end_s - now_s,
+            )  # fmt: skip
+            self._estimates.ask(over.point.segment, b"".join(d for _, d in self._bytes), flown)
 
     def tick(self) -> None:
         """Give the verdict that an estimate was waited for."""

@@ -14,6 +14,7 @@ from typing import cast
 
 from host.live.test_point.point_estimate import PointEstimate
 from host.live.worker_process import WorkerEndedError, WorkerProcess
+from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.twin.testcard.cards import Card, Segment
 
 
@@ -22,7 +23,7 @@ class _Question:
     number: int
     point: Segment
     recording: Path
-    last_s: float
+    flown: DetectedManeuver
 
 
 class PointWorker:
@@ -41,8 +42,8 @@ class PointWorker:
         self._folder = tempfile.TemporaryDirectory(prefix="host-points-")
         self._numbers, self._number = itertools.count(1), 0
 
-    def ask(self, point: Segment, data: bytes, last_s: float) -> None:
-        """Ask what bytes tell of a point that began in their last seconds.
+    def ask(self, point: Segment, data: bytes, flown: DetectedManeuver) -> None:
+        """Ask what bytes tell of a point; its input in seconds from their last row.
 
         The answer to an earlier question is forgotten. The bytes go by a file: a pipe takes 64 kB,
         and then waits for a process that may be busy.
@@ -50,7 +51,7 @@ class PointWorker:
         self._number = next(self._numbers)
         recording = Path(self._folder.name) / f"{self._number}.radio"
         recording.write_bytes(data)
-        self._process.ask(_Question(self._number, point, recording, last_s))
+        self._process.ask(_Question(self._number, point, recording, flown))
 
     def answer(self, timeout_s: float = 0.0) -> PointEstimate | None:
         """Return the answer if it is there; that of a process that died knows nothing."""
@@ -81,4 +82,4 @@ def _estimate_for_ever(asked: Connection, card: Card, calibration: str) -> None:
         one: _Question = asked.recv()
         data = one.recording.read_bytes()
         one.recording.unlink()
-        asked.send((one.number, by.estimate(one.point, data, one.last_s)))
+        asked.send((one.number, by.estimate(one.point, data, one.flown)))

@@ -36,7 +36,7 @@ from host.sysid.coefficients.coefficient_search import search_coefficients
 from host.sysid.coefficients.deletion_diagnostics import CrossValidation
 from host.sysid.coefficients.flight_terms import flight_terms
 from host.sysid.coefficients.pooled_flights import pool_fits
-from host.sysid.coefficients.window_spectra import SHORTEST_S, Window
+from host.sysid.coefficients.window_spectra import SHORTEST_S, ResidualSpectra, Window
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.maneuver_detection import FLYING_SHARE, DetectedManeuver, detect_maneuvers
 from host.sysid.flight.reconstructed_flight import (
@@ -170,12 +170,15 @@ class CoefficientEstimator:
         Standard deviations of the sensor errors.
     model : CoefficientModel
         The terms of every coefficient.
+    known_noise : ResidualSpectra or None
+        Spectra of the residuals in place of those of the flight.
     """
 
     airframe: AirframeData
     powerplant: Powerplant
     instrument: SensorErrorModel
     model: CoefficientModel
+    known_noise: ResidualSpectra | None = None
 
     def estimate(self, flights: Sequence[ReconstructedFlight]) -> tuple[CoefficientEstimate, ...]:
         """Estimate coefficients and sensor errors jointly, flight by flight.
@@ -257,6 +260,7 @@ class CoefficientEstimator:
             self.powerplant,
             terms.model,
             terms.assumed,
+            self.known_noise,
         )
         axes = {w.longitudinal for w in terms.windows}
         used = tuple(f for f in found if (f.axis == "elevator_rad") in axes)

@@ -48,7 +48,7 @@ from host.sysid.coefficients.flight_terms import SIDE
 from host.sysid.coefficients.normal_equations import Prior, solve_normal_equations
 from host.sysid.coefficients.slow_gusts import gust_information, gust_regressors, gust_strength
 from host.sysid.coefficients.trim_derivatives import DerivativesAtTrim
-from host.sysid.coefficients.window_spectra import Window, residual_spectra
+from host.sysid.coefficients.window_spectra import ResidualSpectra, Window, residual_spectra
 from host.sysid.compatibility.inverse_sensor_model import decimate, usable_length
 from host.sysid.identification_error import IdentificationError
 
@@ -79,6 +79,7 @@ def search_coefficients(
     powerplant: Powerplant,
     model: CoefficientModel | None = None,
     assumed: Mapping[str, float] | None = None,
+    known_noise: ResidualSpectra | None = None,
 ) -> SearchResult:
     """Find the coefficients of lift, drag, side force and moments.
 
@@ -94,6 +95,8 @@ def search_coefficients(
         The terms of every coefficient; `standard_model` by default.
     assumed : mapping, optional
         Standard deviations of errors that are larger than the instrument's.
+    known_noise : ResidualSpectra, optional
+        Spectra of residuals that are known of other flights, in place of those of this one.
 
     Returns
     -------
@@ -127,7 +130,7 @@ def search_coefficients(
     sd = dict(deviations(sensors, airframe))
     sd |= {name: max(least, sd[name]) for name, least in (assumed or {}).items()}
     problem = flight_problem(model, record, t, windows, airframe, sensors, powerplant, tuple(sd))
-    return _search(problem, np.array(list(sd.values())))
+    return _search(problem, np.array(list(sd.values())), known_noise or {})
 
 
 def fit_coefficients(
@@ -160,7 +163,7 @@ class _Iterate:
 
     theta: Array
     errors: Array
-    noise: dict[str, tuple[Array, Array]]
+    noise: ResidualSpectra
     slopes: tuple[SensorErrorSlopes, SensorErrorSlopes]
     level_slopes: Array
 
@@ -169,12 +172,13 @@ class _Iterate:
         return {name: self.theta[at] for name, at in problem.positions.items()}
 
 
-def _search(problem: FlightProblem, sd: Array) -> SearchResult:
+def _search(problem: FlightProblem, sd: Array, known_noise: ResidualSpectra) -> SearchResult:
     """Run all rounds; `sd` are the prior standard deviations of the sensor errors."""
     position = problem.position
     iterate = _Iterate(
-        np.zeros(len(position)), np.zeros(len(sd)), {}, ({}, {}), np.zeros((3, len(sd)))
-    )
+        np.zeros(len(position)), np.zeros(len(sd)), known_noise, ({}, {}),
+        np.zeros((3, len(sd))),
+    )  # fmt: skip
     known = problem.error_names  # of servos and clock only where the flight has such errors
     considered = np.array([known.index(n) for n in CONSIDERED if n in known])
     for round_ in range(COEFFICIENT_ROUNDS + JOINT_ROUNDS):
@@ -202,7 +206,9 @@ def _search(problem: FlightProblem, sd: Array) -> SearchResult:
             ((block.equation, block.window), block.residual_after(solution.step))
             for block in blocks
         )
-        iterate.noise = residual_spectra(problem.windows, residuals, iterate.noise)
+        iterate.noise = {
+            **residual_spectra(problem.windows, residuals, iterate.noise), **known_noise
+        }  # fmt: skip
     # Each error is held to be zero with its deviation: what it truly is pulls by its prior alone,
     # whatever noise the data have.
     prior_weight = np.divide(inverse_variance, 1.0 / sd, out=np.zeros_like(sd), where=sd > 0.0)

@@ -23,6 +23,7 @@ KINEMATIC_TREND, AERO_TREND = 4, 2
 SMOOTHING_HZ, GRID = 0.5, 12  # of residual spectra
 SHORTEST_S = 2.0  # shortest window
 EquationKey = tuple[str, int]  # equation, number of the window
+ResidualSpectra = Mapping[str, tuple[Array, Array]]  # by equation: frequency (Hz) and spectrum
 
 
 @dataclass(frozen=True, slots=True)
