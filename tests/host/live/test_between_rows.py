@@ -39,13 +39,14 @@ def flown(response: AircraftResponse) -> dict[str, Vector]:
     none = np.zeros(len(t))
     moved = response.motion("longitudinal", {"elevator": surface, "aileron": none, "rudder": none})
     gust = np.cumsum(rng.normal(0.0, 0.156 * math.sqrt(STEP_S), len(t)))
-    return {
+    columns = {
         "t_s": t, "alpha_rad": 0.05 + moved["alpha"] - gust / SPEED_MPS, "q_radps": moved["q"],
         "theta_rad": 0.05 + np.cumsum(moved["q"]) * STEP_S,
         "elevator_rad": surface - 0.1, "elevator_pot_rad": surface - 0.1,
         "rc_elevator_us": 1520.0 + 900.0 * held, "servo_elevator_us": none + np.nan,
         "mega_drives": none, "az_mps2": none - 9.81,
     }  # fmt: skip
+    return {name: np.asarray(column, np.float64) for name, column in columns.items()}
 
 
 def radio(whole: dict[str, Vector], lost: slice | None = None) -> pd.DataFrame:
