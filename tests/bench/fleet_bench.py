@@ -24,7 +24,7 @@ import psutil
 from host.fleet.dataset.flight_store import FlightStore
 from host.fleet.dataset.row_flights import type_flights
 from host.fleet.runs.fleet_run import run_fleet
-from host.fleet.sources.flight_keys import FleetSources, counted
+from host.fleet.sources.flight_keys import FleetSources, tasks_by_key
 from host.fleet.statistics.type_model import type_model
 from host.fleet.tasks.guarded_child import ONE_THREAD
 from host.fleet.tasks.task_cluster import ClusterOptions
@@ -131,7 +131,7 @@ def children_s() -> float:
 def plain_loop(folder: Path, log: bytes, count: int) -> dict[str, float]:
     """Identify so many flights in a loop of one process without Dask; seconds of one."""
     sources = FleetSources([str(named(folder / "logs", log, count))], AIRCRAFT)
-    tasks = [task.values() for task in counted(sources.tasks()).values()]
+    tasks = [task.values() for task in tasks_by_key(sources.tasks()).values()]
     done = subprocess.run(
         [sys.executable, "-m", "tests.bench.fleet_work"],
         input=json.dumps(tasks), capture_output=True, text=True, check=True, cwd=ROOT,

@@ -176,7 +176,7 @@ def test_streaming_gives_the_same_table(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr("host.wire.store.KEEP_BLOCKS", 0)
     monkeypatch.setattr("host.wire.frames.BLOCKS_AT_ONCE", 97)
     log = read(tmp_path, data)
-    assert not log.store.kept
+    assert not log.store.in_memory
     pieces = log.columns()
     for column in COLUMNS:
         np.testing.assert_array_equal(pieces[column.name], whole[column.name], column.name)

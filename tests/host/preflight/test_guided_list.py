@@ -4,7 +4,7 @@ import pytest
 from host.link.status_line import parse_status
 from host.live.live_stream import LiveStream
 from host.live.page_server import _is_preflight
-from host.preflight.check_list import Wanted
+from host.preflight.check_list import CheckListInputs
 from host.preflight.guided_list import Preflight
 from host.preflight.preflight_screen import list_lines
 from host.preflight.usb_status import status_readings
@@ -25,7 +25,7 @@ STATUS = (
 def test_a_motion_is_asked_for_again_and_turns_green_then() -> None:
     """A slipped vane is put right, and lifted once more."""
     stream = LiveStream(lines())
-    preflight = Preflight(Wanted(aircraft(), lines()), stream)
+    preflight = Preflight(CheckListInputs(aircraft(), lines()), stream)
     walk = ground_walk(aircraft(), 9450)
     item, frames = broken_walk(GROUND_FAULTS["vane_slipped"], walk, ground_frames)
     for window, data in frames.stream(walk.windows):
@@ -46,7 +46,7 @@ def test_a_motion_is_asked_for_again_and_turns_green_then() -> None:
 
 def test_what_nobody_does_is_red_with_what_was_seen() -> None:
     stream = LiveStream(lines())
-    preflight = Preflight(Wanted(aircraft(), lines()), stream)
+    preflight = Preflight(CheckListInputs(aircraft(), lines()), stream)
     preflight.end()
     assert not preflight.go
     assert {check.state for check in preflight.checks} == {"failed"}
@@ -94,7 +94,7 @@ def test_over_usb_the_status_line_stands_for_the_slower_frames() -> None:
     frames.kept[:] = True
     line = (STATUS.format(card="full") + "\r\n").encode()
     stream = LiveStream(lines())
-    preflight = Preflight(Wanted(aircraft(), lines(), by_wire=True), stream)
+    preflight = Preflight(CheckListInputs(aircraft(), lines(), by_wire=True), stream)
     rest = walk.windows[0][2]
     for at, (_, data) in enumerate(frames.timed()):
         stream.feed(data + (line if at % 20 == 19 else b""), 0.0)

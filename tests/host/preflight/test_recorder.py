@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from host.live.live_stream import LiveStream
 from host.physical.calibration import calibration_of_text
-from host.preflight.check_list import Wanted
+from host.preflight.check_list import CheckListInputs
 from host.preflight.guided_list import Preflight
 from host.twin.flight.fly import fly
 from host.twin.ground.ground_faults import GROUND_FAULTS
@@ -27,7 +27,7 @@ def test_the_recorders_own_radio_turns_green_what_needs_no_hand() -> None:
     record = fly(card, seed=9460)
     lines = calibration_of_text(calibration(record.aircraft), Path("virtual"))
     stream = LiveStream(lines)
-    preflight = Preflight(Wanted(record.aircraft, lines), stream)
+    preflight = Preflight(CheckListInputs(record.aircraft, lines), stream)
     given = stimuli(record, air_data(record))
     rate_hz = sitl.recorder_rate_hz(card.flight.rate_hz)
     for sent in radio(given, rate_hz=rate_hz, aircraft=record.aircraft.name):

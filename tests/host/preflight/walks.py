@@ -11,7 +11,7 @@ from host.aircraft.linear_aircraft import load
 from host.live.live_stream import LiveStream
 from host.physical.calibration import Calibration, calibration_of_text
 from host.preflight.check import State
-from host.preflight.check_list import Wanted
+from host.preflight.check_list import CheckListInputs
 from host.preflight.guided_list import Preflight
 from host.twin.ground.ground_faults import GROUND_FAULTS, GroundFault, broken_walk
 from host.twin.ground.ground_instrument import START_US, GroundFrames, ground_frames
@@ -52,7 +52,7 @@ def walked(walk: GroundWalk, frames: GroundFrames, last: str = "", **wanted: Any
 def heard(parts: Iterable[tuple[str, bytes]], last: str = "", **wanted: Any) -> Preflight:
     """Listen to each item's part; a pilot goes on where none turned green or red."""
     stream = LiveStream(lines())
-    preflight = Preflight(Wanted(aircraft(), lines(), **wanted), stream)
+    preflight = Preflight(CheckListInputs(aircraft(), lines(), **wanted), stream)
     for item, data in parts:
         stream.feed(data, 0.0)
         if item == "still" and preflight.asked is None:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from host.report.flight_reading import Wanted, read_flight
+from host.report.flight_reading import FlightRequest, read_flight
 from host.report.shown_flight import ShownFlight
 
 from tests.browser.chromium import Chromium
@@ -18,7 +18,7 @@ def log_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="package")
 def flight(log_file: Path) -> ShownFlight:
-    return read_flight(Wanted(log_file))[0]
+    return read_flight(FlightRequest(log_file))[0]
 
 
 @pytest.fixture(scope="package")

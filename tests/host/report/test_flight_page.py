@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from host.cli import main
 from host.report.flight_page import flight_page
-from host.report.flight_reading import Wanted, read_flight
+from host.report.flight_reading import FlightRequest, read_flight
 from host.report.shown_flight import Happening, ShownFlight
 from host.report.strip_figure import overview_figure
 
@@ -78,7 +78,7 @@ def test_pictures_are_the_same_twice_and_name_what_is_unknown(
 
 def test_a_loss_whose_time_nobody_knows_is_listed_and_no_folder_is_told() -> None:
     """The page said "listed under Losses", and there stood none; its note named a folder."""
-    flight = read_flight(Wanted(PX4))[0]
+    flight = read_flight(FlightRequest(PX4))[0]
     text = flight_page(flight)
     assert "1 lost range: shown as a gap" in text
     assert "<h2>Losses</h2><p>none</p>" not in text and "<td></td><td>" in text

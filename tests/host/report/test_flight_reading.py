@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.cli import main
-from host.report.flight_reading import Wanted, read_flight
+from host.report.flight_reading import FlightRequest, read_flight
 from host.report.shown_flight import ShownFlight, with_gaps
 
 from tests.host.report.flights import DOUBLETS_S, JUMP_S, LOST_S
@@ -31,7 +31,7 @@ def test_of_original_rows_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     capsys.readouterr()
     assert main(["maneuvers", str(rows), "--json"]) == 0
     listed = json.loads(capsys.readouterr().out)["maneuvers"]
-    found = read_flight(Wanted(rows))[0].maneuvers
+    found = read_flight(FlightRequest(rows))[0].maneuvers
     assert [one["start_s"] for one in listed] == pytest.approx([item.start_s for item, _ in found])
 
 

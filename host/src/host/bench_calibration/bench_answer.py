@@ -16,7 +16,7 @@ from host.constants import NORMAL_95
 _RAW = {"channel": "counts", "pulse": "us"}
 
 
-def spoken(subject: Subject, lines: Sequence[Calibrated]) -> list[str]:
+def line_report(subject: Subject, lines: Sequence[Calibrated]) -> list[str]:
     """Return lines on each channel: zero and slope with 95 % half-widths, residuals, doubts."""
     said = []
     for one in lines:
@@ -82,7 +82,7 @@ def _numbers(fit: LineFit) -> dict[str, Any]:
     }
 
 
-def spoken_iron(found: HardIron) -> list[str]:
+def iron_report(found: HardIron) -> list[str]:
     """Return lines on the magnetometer, with the command to type at the IMU's console."""
     centre = ", ".join(
         f"{axis} {c:.0f} +- {NORMAL_95 * s:.1g}"
@@ -98,7 +98,7 @@ def spoken_iron(found: HardIron) -> list[str]:
     return [*said, f"  at the IMU's console: imu iron {x} {y} {z}"]
 
 
-def spoken_supply(found: SupplyReference) -> list[str]:
+def supply_report(found: SupplyReference) -> list[str]:
     """Return lines on the supply, with the command that stores the reference in the board."""
     said = [
         f"supply: the chip's reference is {found.reference_mv:.0f} +-"

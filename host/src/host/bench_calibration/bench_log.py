@@ -92,7 +92,7 @@ class BenchLog:
         return np.asarray(field[good])
 
     def temperature_degc(self) -> float | None:
-        """Return the mean temperature of the pressure sensor, where it was heard."""
+        """Return the mean temperature of the pressure sensor, degC; None without its frames."""
         rows = self.log.frames.get("baro")
         if rows is None or not len(rows):
             return None

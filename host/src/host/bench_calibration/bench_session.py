@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from host.bench_calibration.bench_answer import plain, spoken, spoken_iron, spoken_supply
+from host.bench_calibration.bench_answer import iron_report, line_report, plain, supply_report
 from host.bench_calibration.bench_log import BenchLog, FaceLog, LogSource, turns_of
 from host.bench_calibration.bench_plan import AIR_KGPM3, Subject, local_gravity_mps2
 from host.bench_calibration.bifilar_pendulum import mass_section, read_swings
@@ -130,7 +130,7 @@ def calibrate(
         bench.serials,
         bench.temperature_degc if bench.temperature_degc is not None else temperature,
     )
-    said = [*spoken(bench.subject, lines), *extra]
+    said = [*line_report(bench.subject, lines), *extra]
     tables = lines_of(bench.subject, lines, made)
     files = []
     into = bench.into or Path(f"{_file_name(made.instrument)}-{made.date}.toml")
@@ -264,7 +264,7 @@ def _magnetometer(bench: Bench) -> Result:
         "doubt": found.doubt,
     }
     code = ExitCode.CHECK if found.doubt else ExitCode.OK
-    return Result(tuple(spoken_iron(found)), data, (), code)
+    return Result(tuple(iron_report(found)), data, (), code)
 
 
 def _supply(bench: Bench) -> Result:
@@ -282,7 +282,7 @@ def _supply(bench: Bench) -> Result:
         "doubt": found.doubt,
     }
     code = ExitCode.CHECK if found.doubt else ExitCode.OK
-    return Result(tuple(spoken_supply(found)), data, (), code)
+    return Result(tuple(supply_report(found)), data, (), code)
 
 
 def _inertia(bench: Bench) -> Result:

@@ -114,7 +114,7 @@ def _line(subject: Subject, axis: int, rests: Sequence[Rest], turns: Sequence[Tu
     zero_sigma = _zero_sigma(rest, still, len(numbers))
     left = seen[:, axis] - followed * angle
     worth = hand_worth()
-    # A reading may be off by the stop at its two ends; rests say how well the zero is known.
+    # Both ends of a turn may be off by the play of the stop; rests give the deviation of the zero.
     word = (table.reading * RAD_PER_DEG) ** 2 + float(
         np.mean([(rest.reading * RAD_PER_DEG * t.seconds) ** 2 for t in own])
     ) / len(rests)
@@ -163,7 +163,7 @@ def _zero_sigma(rest: Tool, still: Array, repeats: int) -> float:
 
 
 def _other_axis(seen: Array, angle: Array, axis: int) -> tuple[int, float]:
-    """Return the axis beside the one meant that followed most, and its share."""
+    """Return the other axis that turned most, and its share of the angle."""
     shares = [float(seen[:, k] @ angle / (angle @ angle)) for k in range(3)]
     rest = [k for k in range(3) if k != axis]
     most = max(rest, key=lambda k: abs(shares[k]))

@@ -1,4 +1,4 @@
-"""Readings typed one after another, each asked for in words: the guide at the bench."""
+"""Readings that somebody types, each asked for with its position."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class TypedSource:
     positions : sequence of float
         Of one repeat.
     ask : callable
-        Given what to do and read, returns the line that was typed; empty at the end of the input.
+        Takes a question, returns the typed line; empty at the end of the input.
     say : callable
-        Given a line that needs no answer.
+        Takes a line that needs no answer.
     """
 
     asks = "counts"
@@ -74,7 +74,7 @@ class TypedSource:
         return found
 
     def read(self, line: str, repeat: int, position: float) -> Held | None:
-        """Return the position that was answered with a line; None if it is to be asked again."""
+        """Return the held position of a typed line; None if it must be asked again."""
         try:
             value = float(line)
         except ValueError:

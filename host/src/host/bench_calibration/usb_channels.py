@@ -1,4 +1,4 @@
-"""What the logger's sensors read now: its envelopes on USB, taken by a thread of its own.
+"""Present readings of the logger's sensors: a thread reads its envelopes on USB.
 
 The logger sends 20 a second while it records nothing, and the hash of their schema before each of
 its status lines. Nothing is ever sent to it.
@@ -21,7 +21,7 @@ from host.wire.framing import SCHEMA_HASH_ID, EnvelopeReader
 from host.wire.schema import Schema
 from host.wire.schema_text import known_schemas, packed_schema, parse_schema
 
-SILENT_S = 10.0  # bootloader, start of the logger, its first line
+SILENT_S = 10.0  # time allowed for bootloader, start of the logger and its first line
 _KEPT = 1300  # rows: 65 s, a pressure is held for 60
 
 
@@ -42,7 +42,7 @@ class UsbChannels:
     ----------
     link : Link
     keep : callable, optional
-        Takes every portion of bytes as it came.
+        Takes every portion of received bytes.
 
     Attributes
     ----------

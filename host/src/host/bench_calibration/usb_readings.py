@@ -1,4 +1,4 @@
-"""Held positions read over USB: somebody sets them, the logger says what its sensors read."""
+"""Held positions read over USB: somebody sets them, the logger sends the readings."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from host.physical.timebase import WRAP_US
 
 ROWS = 40  # 2 s, as the procedures hold
 LEAK_ROWS = 1200  # a minute
-_ON_ITS_WAY = 5  # rows that were measured before the Enter, in buffers of the way
-_PARTS = 3  # of a reading, which must agree
-_MOVED = 0.25  # of the smallest step between positions: it was not held still
+_ON_ITS_WAY = 5  # rows dropped after Enter: they were measured before it and still in buffers
+_PARTS = 3  # parts of a reading whose means must agree
+_MOVED = 0.25  # share of the smallest step between positions by which parts may differ
 _SHOWN_S = 0.2
 
 Ask = Callable[[str], str]
@@ -115,7 +115,7 @@ class UsbSource(TypedSource):
         return Held(self._channel, number, position, readings, noise, change, float(t_s[-1]))
 
     def _shown(self, ask: Ask) -> Ask:
-        """Return the same question with the value beside it for as long as it waits."""
+        """Return a function that asks with the present value beside the question while it waits."""
 
         def asked(question: str) -> str:
             last_s = 0.0

@@ -130,7 +130,7 @@ def _size_bytes(folder: Path) -> int:
 
 
 def _files() -> list[Setting]:
-    """Return the files that every verb rests on."""
+    """Return the files that every verb uses."""
     settings = []
     for name in ("default.toml", "schema.json"):
         path = resource(name)

@@ -34,11 +34,11 @@ class Loss:
     offset : int
         Byte position in the file where it begins.
     length : int
-        Bytes; 0 where no byte of the file stands for it.
+        Bytes of the file; 0 for a loss without a place in it.
     blocks : int
         Blocks lost.
     frames : int or None
-        Identification frames lost; None where no counter on both sides tells.
+        Identification frames lost; None without a counter on both sides.
     seconds : float or None
         Time without identification frames beyond the usual interval, s.
     other_frames : int
@@ -46,7 +46,7 @@ class Loss:
     t_s : float or None
         Time of the last row before it.
     ranges : int
-        How many ranges of one cause, from this one on, this record stands for.
+        Number of ranges of the same cause that this record sums up.
     """
 
     cause: str

@@ -125,7 +125,7 @@ def _ended(store: FrameStore) -> bool:
 
 
 def _not_sent(session: Session) -> int:
-    """Return how many frames the aircraft's radio had no room for while the stream was heard."""
+    """Return how many frames the radio had no room for, by its counter, during the stream."""
     system, _ = session.slow("system")
     if not len(system) or "telemetry_dropped" not in (system.dtype.names or ()):
         return 0

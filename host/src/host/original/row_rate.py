@@ -72,7 +72,7 @@ def row_rate(rows: OriginalRows, given_hz: float | None) -> RowRate:
     """
     if given_hz is not None:
         return RowRate(given_hz, 0.0, GIVEN)
-    ways = _ways(rows)
+    ways = _distances(rows)
     unknown = RowRate(float("nan"), float("nan"), UNKNOWN)
     if ways is None:
         return unknown
@@ -93,7 +93,7 @@ def row_rate(rows: OriginalRows, given_hz: float | None) -> RowRate:
     return RowRate(1.0 / row_s, half / row_s**2, GPS)
 
 
-def _ways(rows: OriginalRows) -> tuple[Array, Array] | None:
+def _distances(rows: OriginalRows) -> tuple[Array, Array] | None:
     """Return the distance (m) and the summed velocity (m/s) of each stretch, (k, 2) each."""
     wanted = ("fix", "lat", "lon", "gpsgc", "gpsgs")
     if any(label not in rows.values for label in wanted):

@@ -59,22 +59,22 @@ class Check:
     def take(self, sample: Sample) -> None:
         """Take a row."""
 
-    def hear(self, reading: SlowReading) -> None:
+    def take_reading(self, reading: SlowReading) -> None:
         """Take a slower frame."""
 
     def missing(self) -> str:
         """Return why it is not yet passed: the reason on the sheet if the pilot goes on."""
         return self.reason or "not seen"
 
-    def seen(self) -> None:
+    def pass_check(self) -> None:
         """Turn green."""
         self.state, self.reason = State.SEEN, ""
 
-    def failed(self, reason: str) -> None:
+    def fail_check(self, reason: str) -> None:
         """Turn red, and say why."""
         self.state, self.reason = State.FAILED, reason
 
-    def waits(self, reason: str) -> None:
+    def keep_waiting(self, reason: str) -> None:
         """Go back to waiting, and say for what."""
         self.state, self.reason = State.WAITING, reason
 

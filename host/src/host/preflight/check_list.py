@@ -35,7 +35,7 @@ PARTS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class CheckListInputs:
     """What the list of checks depends on.
 
     Attributes
@@ -56,12 +56,12 @@ class Wanted:
     by_wire: bool = False
 
 
-def check_list(wanted: Wanted) -> list[Check]:
+def check_list(wanted: CheckListInputs) -> list[Check]:
     """Return the checks in their order.
 
     Parameters
     ----------
-    wanted : Wanted
+    wanted : CheckListInputs
     """
     out = left_out(wanted.without)
     vanes = tuple(name for name in VANES if name not in out)
@@ -82,7 +82,7 @@ def check_list(wanted: Wanted) -> list[Check]:
     return kept
 
 
-def surface_check(wanted: Wanted, surface: str) -> SurfaceCheck:
+def surface_check(wanted: CheckListInputs, surface: str) -> SurfaceCheck:
     """Return the check of one surface."""
     limit_rad = wanted.aircraft.scalars.get(f"surfaces.{surface}_limit_rad")
     slope = wanted.calibration.lines[f"pulse.{surface}"].slope[0]

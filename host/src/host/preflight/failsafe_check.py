@@ -81,14 +81,16 @@ class FailsafeCheck(AskedCheck):
                 self._raised_us = math.nan
             return
         if math.isnan(self._raised_us):
-            self.waits("the transmitter went off with the throttle at idle: raise it to a quarter")
+            self.keep_waiting(
+                "the transmitter went off with the throttle at idle: raise it to a quarter"
+            )
             return
         self._lost_s = t_s
 
     def _off(self, since_s: float, throttle: float, lost: bool) -> None:
         if not lost:
             self._lost_s = math.nan  # a drop-out, or too short
-            self.waits("off for a moment only: leave the transmitter off for 3 s")
+            self.keep_waiting("off for a moment only: leave the transmitter off for 3 s")
             return
         if since_s < self.limit["settle_s"]:
             return
@@ -97,7 +99,7 @@ class FailsafeCheck(AskedCheck):
         if math.isfinite(throttle):
             self.values["throttle_lost_us"] = throttle
         if throttle > self._settings.idle_max_us:
-            self.failed(
+            self.fail_check(
                 f"the throttle stays at {throttle:.0f} us without the transmitter, idle is"
                 f" {self._settings.idle_max_us:.0f} at most: the fail-safe keeps it; do not fly"
             )
@@ -108,4 +110,4 @@ class FailsafeCheck(AskedCheck):
         elif math.isnan(self._back_s):
             self._back_s = t_s
         elif t_s - self._back_s >= self.limit["back_s"] and self.state == "waiting":
-            self.seen()
+            self.pass_check()

@@ -9,7 +9,7 @@ from typing import Any
 from host.live.live_sample import LiveUpdate
 from host.live.live_stream import LiveStream
 from host.preflight.check import Check, State
-from host.preflight.check_list import Wanted, check_list
+from host.preflight.check_list import CheckListInputs, check_list
 from host.preflight.load_checks import RadioCheck
 from host.preflight.sample import Sample, SlowReading, in_order
 
@@ -23,7 +23,7 @@ class Preflight:
 
     Parameters
     ----------
-    wanted : Wanted
+    wanted : CheckListInputs
     stream : LiveStream
         Subscribed to.
     changed : callable, optional
@@ -39,7 +39,10 @@ class Preflight:
     """
 
     def __init__(
-        self, wanted: Wanted, stream: LiveStream, changed: Callable[[Check], None] | None = None
+        self,
+        wanted: CheckListInputs,
+        stream: LiveStream,
+        changed: Callable[[Check], None] | None = None,
     ) -> None:
         self.wanted = wanted
         self.checks = check_list(wanted)
@@ -77,13 +80,13 @@ class Preflight:
 
     def _hear(self, reading: SlowReading) -> None:
         """Hand a slower frame to all that watch, and to the motion asked for."""
-        self.wanted.settings.hear(reading)
+        self.wanted.settings.take_reading(reading)
         if reading.name in ("identity", "status"):
             self.logger = reading.said
         for check in self._watching:
-            check.hear(reading)
+            check.take_reading(reading)
         if self.asked is not None:
-            self.asked.hear(reading)
+            self.asked.take_reading(reading)
             self._decided(reading.t_s)
 
     def _look(self, sample: Sample) -> None:
@@ -109,7 +112,7 @@ class Preflight:
     def pass_on(self) -> None:
         """Skip the motion that is asked for: it stays red, with its progress so far."""
         if self.asked is not None and self.asked.state == State.WAITING:
-            self.asked.failed(self.asked.missing())
+            self.asked.fail_check(self.asked.missing())
             self._changed(self.asked)
         elif self.asked is None:  # what is watched does not turn green: the pilot goes on
             self._passed |= set(STILL)
@@ -134,7 +137,7 @@ class Preflight:
         """End the list now: items not passed so far count as not passed."""
         for check in self.checks:
             if check.state == State.WAITING:
-                check.failed(check.missing() if check is self.asked or not check.asked
+                check.fail_check(check.missing() if check is self.asked or not check.asked
                              else "not looked at")  # fmt: skip
                 self._changed(check)
         self.asked = None

@@ -41,15 +41,15 @@ class SupplyCheck(AskedCheck):
         if self._stirred_s >= self.limit["stir_s"] and len(self._rail) > 2:
             self._judge()
 
-    def hear(self, reading: SlowReading) -> None:
+    def take_reading(self, reading: SlowReading) -> None:
         """Take both voltages, said once a second."""
         if reading.name == "event" and reading.said["code"] == "rail low":
-            self.failed(f"the servo rail fell to {reading.said['arg'] / 1000.0:.1f} V")
+            self.fail_check(f"the servo rail fell to {reading.said['arg'] / 1000.0:.1f} V")
         if reading.name != "system":
             return
         rail_v, supply_v = reading.said["rail_v"], reading.said["supply_v"]
         if rail_v is None or supply_v is None:
-            self.waits("no voltage of the servo rail: its divider on A15, receiver powered?")
+            self.keep_waiting("no voltage of the servo rail: its divider on A15, receiver powered?")
         elif not self._stirring:
             if math.isnan(self._rest_v):
                 self._rest_v = rail_v
@@ -66,21 +66,21 @@ class SupplyCheck(AskedCheck):
         rest_v = rail_v if math.isnan(self._rest_v) else self._rest_v
         self.values = {"rail_rest_v": rest_v, "rail_least_v": rail_v, "supply_least_v": supply_v}
         if rail_v < self.limit["rail_v"]:
-            self.failed(
+            self.fail_check(
                 f"the servo rail falls from {rest_v:.2f} to {rail_v:.2f} V, {self.limit['rail_v']}"
                 " at least: charge the pack, a stiffer regulator, or a servo that binds"
             )
         elif rest_v - rail_v > self.limit["sag_v"]:
-            self.failed(
+            self.fail_check(
                 f"the servo rail sags by {rest_v - rail_v:.2f} V: a servo that binds, thin leads"
             )
         elif supply_v < self.limit["supply_v"]:
-            self.failed(
+            self.fail_check(
                 f"the logger's supply falls to {supply_v:.2f} V, {self.limit['supply_v']} at least:"
                 " its regulator, or host calibrate supply"
             )
         else:
-            self.seen()
+            self.pass_check()
 
 
 class RadioCheck(AskedCheck):
@@ -104,7 +104,7 @@ class RadioCheck(AskedCheck):
         self._begin_s = math.nan
         self._rows = self._lost = 0
         if self._by_wire:
-            self.failed("not looked at: this is a USB line; run it on the radio's port")
+            self.fail_check("not looked at: this is a USB line; run it on the radio's port")
 
     def take(self, sample: Sample) -> None:
         """Count a row."""
@@ -118,12 +118,12 @@ class RadioCheck(AskedCheck):
             return
         self.values = {"lost_share": share, "rows": float(self._rows)}
         if share > self.limit["lost_share"]:
-            self.failed(
+            self.fail_check(
                 f"{share:.0%} of its rows lost, {self.limit['lost_share']:.0%} at most: antennas,"
                 " their place in the aircraft, the channel"
             )
         else:
-            self.seen()
+            self.pass_check()
 
     def lost(self, rows: int) -> None:
         """Take how many rows did not arrive."""

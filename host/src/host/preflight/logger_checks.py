@@ -38,9 +38,9 @@ class LoggerCheck(Check):
             self._first_s = sample.t_s
         late = sample.t_s - self._first_s > self.limit["settings_s"]
         if late and self.state == "waiting":
-            self.failed("no settings heard: is its firmware ours, its telemetry set to frames?")
+            self.fail_check("no settings heard: is its firmware ours, its telemetry set to frames?")
 
-    def hear(self, reading: SlowReading) -> None:
+    def take_reading(self, reading: SlowReading) -> None:
         """Take settings, events, and the time since power-on."""
         said = reading.said
         if reading.name == "system":
@@ -55,7 +55,7 @@ class LoggerCheck(Check):
         elif reading.name == "event" and said["code"] == "settings default":
             self._broken = "its stored settings are damaged or of another version: default ones act"
         elif reading.name == "status" and not self._broken:
-            self.seen()  # over USB its settings are not said
+            self.pass_check()  # over USB its settings are not said
         elif reading.name == "config" and said["aircraft"] != self._aircraft:
             self._broken = (
                 f"it is set for {said['aircraft'] or 'no aircraft'}, the aircraft file is"
@@ -64,9 +64,9 @@ class LoggerCheck(Check):
         elif reading.name == "config":
             self.values["rate_hz"] = float(said["rate_hz"])
             if not self._broken:
-                self.seen()
+                self.pass_check()
         if self._broken:
-            self.failed(self._broken)
+            self.fail_check(self._broken)
 
 
 class ReceiverCheck(Check):
@@ -97,11 +97,11 @@ class ReceiverCheck(Check):
             hint = (
                 "transmitter on, receiver powered?" if len(missing) > 1 else "its lead in A8-A12?"
             )
-            self.waits(f"no pulses on {what}: {hint}")
+            self.keep_waiting(f"no pulses on {what}: {hint}")
             return
         if sample["rc_switch_us"] < self._preset_us:
             self._since_s = None
-            self.waits("it sends its preset pulses: is the transmitter on?")
+            self.keep_waiting("it sends its preset pulses: is the transmitter on?")
             return
         if self._since_s is None:
             self._since_s = sample.t_s
@@ -110,11 +110,11 @@ class ReceiverCheck(Check):
             return
         self.values["glitches_per_s"] = rate
         if rate > self.limit["glitches_per_s"]:
-            self.failed(f"{rate:.0f} wrong pulses a second: a loose lead, or noise beside it")
+            self.fail_check(f"{rate:.0f} wrong pulses a second: a loose lead, or noise beside it")
         else:
-            self.seen()
+            self.pass_check()
 
-    def hear(self, reading: SlowReading) -> None:
+    def take_reading(self, reading: SlowReading) -> None:
         """Take the count of wrong pulses."""
         if reading.name == "system":
             self._glitches.append((reading.t_s, reading.said["rc_glitches"]))
@@ -124,7 +124,7 @@ class ReceiverCheck(Check):
         ):
             word = "a storm of edges" if "storm" in reading.said["code"] else "pulses of no servo"
             self._odd = f"{word} on its lines: a loose lead, or noise beside it"
-            self.failed(self._odd)
+            self.fail_check(self._odd)
 
     def missing(self) -> str:
         """Return why it is not yet passed: the values seen so far."""
@@ -145,7 +145,7 @@ class CardCheck(Check):
         self._since_s: float | None = None
         self._status = ""
 
-    def hear(self, reading: SlowReading) -> None:
+    def take_reading(self, reading: SlowReading) -> None:
         """Take the logger's frames about its card."""
         if reading.name == "status":
             self._status = reading.said["card"]
@@ -166,13 +166,13 @@ class CardCheck(Check):
                 self._status
                 or "missing, full, or not prepared yet; `host status` on USB says which"
             )
-            self.failed(f"no file is ready on the card: {why}")
+            self.fail_check(f"no file is ready on the card: {why}")
         elif said["card_errors"]:
-            self.failed(f"{said['card_errors']} card errors since power-on: use another card")
+            self.fail_check(f"{said['card_errors']} card errors since power-on: use another card")
         else:
             if self._since_s is None:
                 self._since_s = reading.t_s
             if reading.t_s - self._since_s >= self.limit["hold_s"]:
-                self.seen()
+                self.pass_check()
             elif self.state != "seen":
-                self.waits("seen ready, watched for a moment")
+                self.keep_waiting("seen ready, watched for a moment")

@@ -33,7 +33,7 @@ class GpsCheck(Check):
     def take(self, sample: Sample) -> None:
         """Look at its age."""
         if not self._settings.gps:
-            self.seen()  # the settings expect none
+            self.pass_check()  # the settings expect none
             return
         if self._first_s is None:
             self._first_s = sample.t_s
@@ -43,13 +43,13 @@ class GpsCheck(Check):
             return
         self._since_s = None
         if self._heard_s is None:
-            self.failed(f"nothing heard of it for {age_s:.0f} s: antenna, plug, TX and RX")
+            self.fail_check(f"nothing heard of it for {age_s:.0f} s: antenna, plug, TX and RX")
         elif sample.t_s - self._heard_s > self.limit["stale_s"]:
-            self.failed(f"stale: it went silent {sample.t_s - self._heard_s:.0f} s ago")
+            self.fail_check(f"stale: it went silent {sample.t_s - self._heard_s:.0f} s ago")
         else:
-            self.failed(f"stale: the same solution for {age_s:.0f} s")
+            self.fail_check(f"stale: the same solution for {age_s:.0f} s")
 
-    def hear(self, reading: SlowReading) -> None:
+    def take_reading(self, reading: SlowReading) -> None:
         """Take a solution, or its count of wrong messages."""
         if reading.name == "gps":
             self._solution(reading)
@@ -69,7 +69,7 @@ class GpsCheck(Check):
             if span_s > 2.5 and rate > self.limit["garbled_per_s"]:
                 self._since_s = None
                 self._lead = f"{rate:.0f} of its messages a second are damaged: its lead, its baud"
-                self.failed(self._lead)
+                self.fail_check(self._lead)
         else:
             self._errors = reading.t_s, count
 
@@ -82,7 +82,7 @@ class GpsCheck(Check):
         wrong = self._wrong(said)
         if wrong:
             self._since_s = None
-            self.failed(wrong)
+            self.fail_check(wrong)
             return
         if self._lead:
             return
@@ -93,9 +93,9 @@ class GpsCheck(Check):
             "h_accuracy_m": said["h_accuracy"] or math.nan,
         }
         if reading.t_s - self._since_s >= self.limit["hold_s"]:
-            self.seen()
+            self.pass_check()
         elif self.state != "seen":
-            self.waits("a fix, watched for a moment")
+            self.keep_waiting("a fix, watched for a moment")
 
     def _wrong(self, said: dict[str, Any]) -> str:
         if said["fix"] != "fix 3d":
@@ -133,9 +133,9 @@ class BaroCheck(Check):
         if age_s > self.limit["stale_s"]:
             self._since_s = None
             known = "nothing heard of it" if self._heard_s is None else "stale: it went silent"
-            self.failed(f"{known} for {age_s:.0f} s: its bus, its plug")
+            self.fail_check(f"{known} for {age_s:.0f} s: its bus, its plug")
 
-    def hear(self, reading: SlowReading) -> None:
+    def take_reading(self, reading: SlowReading) -> None:
         """Take a pressure, or its count of errors."""
         said = reading.said
         if reading.name == "system":
@@ -146,7 +146,7 @@ class BaroCheck(Check):
             self._bus = ""
             if span_s > 2.5 and rate > self.limit["errors_per_s"]:
                 self._bus = f"{rate:.0f} errors a second on its bus"
-                self.failed(self._bus)
+                self.fail_check(self._bus)
         if reading.name != "baro":
             return
         self._heard_s = reading.t_s
@@ -155,10 +155,10 @@ class BaroCheck(Check):
         if pressure is None or not self.limit["least_pa"] < pressure < self.limit["most_pa"]:
             self._since_s = None
             what = "no pressure" if pressure is None else f"{pressure / 100.0:.0f} hPa"
-            self.failed(f"says {what}, which cannot be: the sensor, or its memory is blank")
+            self.fail_check(f"says {what}, which cannot be: the sensor, or its memory is blank")
         elif len(self._recent) == self._recent.maxlen and len(set(self._recent)) == 1:
             self._since_s = None
-            self.failed("stale: its reading repeats to the last digit")
+            self.fail_check("stale: its reading repeats to the last digit")
         elif not self._bus:
             self._fine(reading.t_s, pressure)
 
@@ -171,6 +171,6 @@ class BaroCheck(Check):
             self._since_s = t_s
         self.values = {"static_pa": pressure_pa}
         if t_s - self._since_s >= self.limit["hold_s"]:
-            self.seen()
+            self.pass_check()
         elif self.state != "seen":
-            self.waits("fresh, watched for a moment")
+            self.keep_waiting("fresh, watched for a moment")

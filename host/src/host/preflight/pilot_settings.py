@@ -37,7 +37,7 @@ class PilotSettings:
         self.idle_max_us = float(shipped["throttle_idle_max_us"])
         self.gps = shipped["gps_source"] != 0
 
-    def hear(self, reading: SlowReading) -> None:
+    def take_reading(self, reading: SlowReading) -> None:
         """Take the settings of the logger."""
         if reading.name != "config":
             return

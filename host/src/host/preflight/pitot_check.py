@@ -71,16 +71,18 @@ class PitotCheck(AskedCheck):
     def _check_rise(self, t_s: float, pressure: float) -> None:
         blow = self.limit["blow_pa"]
         if pressure < -blow:
-            self.failed("the pressure fell: the two hoses at its sensor are swapped")
+            self.fail_check("the pressure fell: the two hoses at its sensor are swapped")
             return
         if pressure > self.limit["blow_most_pa"]:
-            self.failed(f"{pressure:.0f} Pa is the end of its range: blow gently, then do it again")
+            self.fail_check(
+                f"{pressure:.0f} Pa is the end of its range: blow gently, then do it again"
+            )
             return
         if math.isnan(self._rose_s):
             if pressure > blow:
                 self._rose_s, self._peak = t_s, pressure
             elif self._other_peak > 2.0 * blow and pressure < 0.2 * blow:
-                self.failed(f"the {PITOTS[self._other]} rose in its place: swapped pair")
+                self.fail_check(f"the {PITOTS[self._other]} rose in its place: swapped pair")
             return
         self._peak = max(self._peak, pressure)
         if pressure >= 0.8 * self._peak:
@@ -92,16 +94,16 @@ class PitotCheck(AskedCheck):
         """Judge a pressure that is gone."""
         fell_s, held_s = t_s - self._high_s, self._high_s - self._rose_s
         if self._other_peak > self.limit["other_share"] * self._peak:
-            self.failed(f"the {PITOTS[self._other]} rose too: their hoses are joined")
+            self.fail_check(f"the {PITOTS[self._other]} rose too: their hoses are joined")
         elif fell_s > self.limit["fall_s"]:
-            self.failed(
+            self.fail_check(
                 f"fell from {self._peak:.0f} Pa to a half in {fell_s:.1f} s while it was held: the"
                 " tube or a joint leaks (or the hose was not pinched: do it again)"
             )
         elif held_s < self.limit["hold_s"]:
             self._longest_s = max(self._longest_s, held_s)
             self._rose_s = self._high_s = math.nan
-            self.waits(f"held for {held_s:.1f} s: pinch the hose for 3 s")
+            self.keep_waiting(f"held for {held_s:.1f} s: pinch the hose for 3 s")
         else:
             self.values = {"blown_pa": self._peak, "held_s": held_s}
-            self.seen()
+            self.pass_check()

@@ -17,7 +17,7 @@ from host.live.live_program import LiveRequest, LiveSummary, run_live
 from host.live.live_session import LiveSession
 from host.physical.calibration import Calibration
 from host.preflight.check import Check, State
-from host.preflight.check_list import Wanted, left_out
+from host.preflight.check_list import CheckListInputs, left_out
 from host.preflight.guided_list import Preflight
 from host.preflight.preflight_screen import PreflightScreen
 from host.preflight.preflight_sheet import SUFFIX, sheet_document, write_sheet
@@ -96,7 +96,7 @@ def run_preflight(
 
     def join(session: LiveSession, calibration: Calibration) -> Callable[[], None]:
         by_wire = session.source.baud == BAUD
-        wanted = Wanted(aircraft, calibration, without=request.without, by_wire=by_wire)
+        wanted = CheckListInputs(aircraft, calibration, without=request.without, by_wire=by_wire)
         walk = _Walk(request, session, wanted, screen)
         done.append(walk)
         if keys is not None:
@@ -116,7 +116,7 @@ class _Walk:
         self,
         request: PreflightRequest,
         session: LiveSession,
-        wanted: Wanted,
+        wanted: CheckListInputs,
         screen: PreflightScreen,
     ) -> None:
         self.preflight = Preflight(wanted, session.stream, self._changed)

@@ -35,7 +35,7 @@ class RelayCheck(AskedCheck):
         self._since_s = math.nan
         self._phase = 0  # 0 at rest, 1 at Mega, 2 back
 
-    def hear(self, reading: SlowReading) -> None:
+    def take_reading(self, reading: SlowReading) -> None:
         """Take the frames that say who drives the servos and whether the relay follows."""
         if reading.name == "system":
             self._drive = reading.said["drive"]
@@ -78,7 +78,7 @@ class RelayCheck(AskedCheck):
         if self._at != "direct" or held_s < self.limit["rest_s"]:
             return
         if sample.mega_drives and held_s > self.limit["follow_s"]:
-            self.failed(
+            self.fail_check(
                 "stuck at Mega: the sense line says engaged with the switch at direct; a welded"
                 " contact, Q1 shorted, or pin 9 at ground"
             )
@@ -96,18 +96,20 @@ class RelayCheck(AskedCheck):
 
     def _release(self, sample: Sample, held_s: float) -> None:
         if self._at == "mega" and not sample.mega_drives:
-            self.failed(
+            self.fail_check(
                 "the contact fell back while the switch stood at Mega: its coil, its supply"
             )
         elif self._at == "direct" and not sample.mega_drives and held_s >= self.limit["rest_s"]:
-            self.seen()
+            self.pass_check()
         elif self._at == "direct" and held_s > self.limit["follow_s"]:
-            self.failed("stuck at Mega: the sense line says engaged behind the switch to direct")
+            self.fail_check(
+                "stuck at Mega: the sense line says engaged behind the switch to direct"
+            )
 
     def _lost(self) -> None:
         if self.state == "waiting":
             drive = f" (the logger says: {self._drive})" if self._drive else ""
-            self.failed(
+            self.fail_check(
                 "stuck at direct: the sense line did not say engaged with the switch at Mega"
                 f"{drive}; the relay does not pull in, or the sense line (pin 9) is broken"
             )

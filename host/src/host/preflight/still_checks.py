@@ -49,7 +49,7 @@ class ImuCheck(Check):
             self._last, self._changed_s = row, sample.t_s
         self._valid_s = sample.t_s
         if sample.t_s - self._changed_s > self.limit["frozen_s"]:
-            self.failed("frozen: every rate and acceleration repeats to the last digit")
+            self.fail_check("frozen: every rate and acceleration repeats to the last digit")
             return
         if self.state == "seen" or self._link or self._odd:
             return
@@ -57,13 +57,13 @@ class ImuCheck(Check):
         if self._window.full:
             self._judge(self._window.columns())
 
-    def hear(self, reading: SlowReading) -> None:
+    def take_reading(self, reading: SlowReading) -> None:
         """Take the counts of the IMU's packets."""
         if reading.name == "event" and reading.said["code"] in ("imu restarted", "imu lost"):
             self._odd = (
                 f"{reading.said['code'].replace('imu ', 'it ')} meanwhile: its supply, its plug"
             )
-            self.failed(self._odd)
+            self.fail_check(self._odd)
         if reading.name != "system" or self._odd:
             return
         said = reading.said
@@ -79,16 +79,18 @@ class ImuCheck(Check):
         elif "imu" in said["sensors"] and good < self.limit["packets_per_s"] * span_s:
             self._link = f"sends {good / span_s:.0f} packets a second, 200 expected: its program"
         if self._link:
-            self.failed(self._link)
+            self.fail_check(self._link)
 
     def _dead(self, t_s: float) -> None:
         if self._valid_s < 0.0:
             if self._first_s is None:
                 self._first_s = t_s
             if t_s - self._first_s > self.limit["still_s"]:
-                self.failed("no valid rates or accelerations: unplugged, or one at its range's end")
+                self.fail_check(
+                    "no valid rates or accelerations: unplugged, or one at its range's end"
+                )
         elif self._valid_s >= 0.0 and t_s - self._valid_s > self.limit["silent_s"]:
-            self.failed(f"silent for {t_s - self._valid_s:.1f} s: its values are stale")
+            self.fail_check(f"silent for {t_s - self._valid_s:.1f} s: its values are stale")
 
     def _judge(self, columns: list[list[float]]) -> None:
         noise = max(map(scatter, columns[:3]))
@@ -97,18 +99,18 @@ class ImuCheck(Check):
         tilt = math.acos(max(-1.0, min(1.0, -force[2] / size))) * DEG_PER_RAD if size else 180.0
         self.values = {"tilt_deg": tilt, "gravity_mps2": size, "rate_noise_degps": noise}
         if noise > self.limit["rate_noise_degps"]:
-            self.waits(f"not still: rates scatter by {noise:.1f} deg/s")
+            self.keep_waiting(f"not still: rates scatter by {noise:.1f} deg/s")
         elif abs(size - GRAVITY_MPS2) > self.limit["gravity_mps2"]:
-            self.failed(f"feels {size:.1f} m/s2 at rest, not {GRAVITY_MPS2:.1f}: accelerometer")
+            self.fail_check(f"reads {size:.1f} m/s2 at rest, not {GRAVITY_MPS2:.1f}: accelerometer")
         elif tilt > self.limit["level_deg"]:
             pitch = math.atan2(force[0], -force[2]) * DEG_PER_RAD
             roll = math.atan2(-force[1], -force[2]) * DEG_PER_RAD
-            self.failed(
+            self.fail_check(
                 f"tilted: pitch {pitch:+.0f}, roll {roll:+.0f} deg; level the aircraft, or the IMU"
                 " sits crooked"
             )
         else:
-            self.seen()
+            self.pass_check()
 
 
 class GyroZeroCheck(Check):
@@ -129,11 +131,11 @@ class GyroZeroCheck(Check):
         if not self._window.full:
             missing = [name[0] for name, one in zip(RATES, row, strict=True) if math.isnan(one)]
             if missing:
-                self.failed(f"no valid {', '.join(missing)}: unplugged, or at its range's end")
+                self.fail_check(f"no valid {', '.join(missing)}: unplugged, or at its range's end")
             return
         columns = self._window.columns()
         if max(map(scatter, columns)) > self._noise:
-            self.waits("not still")
+            self.keep_waiting("not still")
             return
         means = [mean(column) for column in columns]
         self.values = dict(
@@ -142,15 +144,15 @@ class GyroZeroCheck(Check):
         still = [name[0] for name, one in zip(RATES, columns, strict=True) if min(one) == max(one)]
         worst = max(range(3), key=lambda k: abs(means[k]))
         if still:
-            self.failed(f"{', '.join(still)} does not change by a digit: dead axis")
+            self.fail_check(f"{', '.join(still)} does not change by a digit: dead axis")
         elif abs(means[worst]) > self.limit["zero_degps"]:
             name = RATES[worst][0]
-            self.failed(
+            self.fail_check(
                 f"{name} reads {means[worst]:+.1f} deg/s at rest: power the logger anew and"
                 " keep the aircraft still, or calibrate the gyros"
             )
         else:
-            self.seen()
+            self.pass_check()
 
     def missing(self) -> str:
         """Return why it is not yet passed: the values seen so far."""
@@ -174,25 +176,27 @@ class RestPressureCheck(Check):
         dead = [side for side, one in zip(self._sides, row, strict=True) if math.isnan(one)]
         if dead:
             names = " and ".join({"a": "left", "b": "right"}[side] for side in dead)
-            self.failed(f"{names} pitot: open or shorted, its voltage is at an end of its range")
+            self.fail_check(
+                f"{names} pitot: open or shorted, its voltage is at an end of its range"
+            )
         self._window.add(sample.t_s, row)
         if not self._window.full:
             return
         columns = self._window.columns()
         if max(map(scatter, columns)) > 0.5 * self.limit["rest_pa"]:
             if self.state == "waiting":
-                self.waits("not steady: cover the pitots from the wind")
+                self.keep_waiting("not steady: cover the pitots from the wind")
             return
         self.values = {f"rest_{s}_pa": mean(c) for s, c in zip(self._sides, columns, strict=True)}
         for side, column in zip(self._sides, columns, strict=True):
             pressure, name = mean(column), {"a": "left", "b": "right"}[side]
             if abs(pressure) > self.limit["rest_pa"]:
-                self.failed(
+                self.fail_check(
                     f"{name} pitot reads {pressure:+.0f} Pa at rest: cover it from the wind, or its"
                     " zero is off (host calibrate pitots)"
                 )
                 return
-        self.seen()
+        self.pass_check()
 
     def missing(self) -> str:
         """Return why it is not yet passed: the values seen so far."""

@@ -116,7 +116,7 @@ class SurfaceCheck(AskedCheck):
         if own.both and own.back and all(self._pots[name].back for name in self._own_pots()):
             self._judge(own)
         elif not own.first and math.isfinite(own.rest) and self._elsewhere():
-            self.failed(
+            self.fail_check(
                 f"the {self._elsewhere()} channel moved in its place: channels swapped at the"
                 " receiver, or input_... in firmware/settings.toml"
             )
@@ -151,16 +151,16 @@ class SurfaceCheck(AskedCheck):
             self.values[f"{name.removesuffix('_deg')}_down_deg"] = throw.down
         reason = self._pot_fault()
         if reason:
-            self.failed(reason)
+            self.fail_check(reason)
         elif wrong_channel and all(
             self._pots[name].first == -sign for name, sign in self._columns.items()
         ):
-            self.failed(
+            self.fail_check(
                 f"wrong direction: with this stick the surface goes {self._way} last, not first;"
                 " reverse the channel in the transmitter (or the stick was moved the other way)"
             )
         elif wrong_channel:
-            self.failed("its channel goes the other way than its calibration says ([pulse])")
+            self.fail_check("its channel goes the other way than its calibration says ([pulse])")
         else:
             self._travel(own)
 
@@ -194,7 +194,7 @@ class SurfaceCheck(AskedCheck):
     def _travel(self, own: Throw) -> None:
         limit_deg = self._limit_deg
         if min(own.up, own.down) < self.limit["full_us"]:
-            self.failed(
+            self.fail_check(
                 f"its channel moved {own.up:.0f} us up and {own.down:.0f} us down only: stick not"
                 " full, dual rate, or limits in the transmitter"
             )
@@ -205,9 +205,9 @@ class SurfaceCheck(AskedCheck):
                 if limit_deg and not (
                     self.limit["least_share"] <= way / limit_deg <= self.limit["most_share"]
                 ):
-                    self.failed(
+                    self.fail_check(
                         f"{POT_NAMES[name]}: {throw.up:.0f} deg one way, {throw.down:.0f} the"
                         f" other, the aircraft file says {limit_deg:.0f}: travel, linkage, or file"
                     )
                     return
-        self.seen()
+        self.pass_check()

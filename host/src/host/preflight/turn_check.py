@@ -99,14 +99,14 @@ class TurnCheck(AskedCheck):
         for k in range(2):
             least, most = self._force[k]
             if max(most, -least) < self.limit["angle_deg"] or most < -least:
-                self.failed(
+                self.fail_check(
                     f"gravity does not see {_WAYS[k]}: accelerometer, or the IMU is mounted turned"
                 )
                 return
         if wrong:
-            self.failed(
+            self.fail_check(
                 f"{', '.join(wrong)}: wrong direction ({', '.join(_WAYS)} are positive), or the"
                 " aircraft was turned the other way"
             )
         else:
-            self.seen()
+            self.pass_check()

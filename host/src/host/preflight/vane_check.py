@@ -73,7 +73,7 @@ class VaneCheck(AskedCheck):
         if self._first > 0 and self._least < -seen and angle > self._least + back:
             self._judge()
         elif self._first < 0 and self._most > seen and angle < self._most - back:
-            self.failed(
+            self.fail_check(
                 f"went to {self._least:+.0f} deg first: wrong direction, its sign in the"
                 " calibration, or the vane on the other side of its axle"
             )
@@ -83,28 +83,28 @@ class VaneCheck(AskedCheck):
         stop = 0.5 * (self._most - self._least)
         self.values = {"stop_up_deg": self._most, "stop_down_deg": self._least}
         if abs(middle) > self.limit["middle_deg"]:
-            self.failed(
+            self.fail_check(
                 f"the middle of its stops reads {middle:+.1f} deg: slipped on its axle since it was"
                 f" calibrated ({self._least:+.0f} to {self._most:+.0f} deg)"
             )
         elif abs(stop - self.limit["stop_deg"]) > self.limit["stop_tolerance_deg"]:
-            self.failed(
+            self.fail_check(
                 f"travels {stop:.0f} deg to each stop, {self.limit['stop_deg']:.0f} expected: its"
                 " slope in the calibration, or something in its way"
             )
         else:
-            self.seen()
+            self.pass_check()
 
     def _follow_other(self, name: str, angle: float) -> None:
         if math.isfinite(angle):
             self._other[name] = _wider(self._other.get(name, (math.nan, math.nan)), angle)
 
     def _swapped(self) -> None:
-        """Name a vane that went to both stops in place of this one."""
+        """Fail with the name of the vane that went to both stops in place of this one."""
         still = not self._valid or self._most - self._least < self.limit["back_deg"]
         for name, (least, most) in self._other.items():
             if still and least < -self.limit["seen_deg"] and most > self.limit["seen_deg"]:
-                self.failed(f"the {VANES[name][0]} moved in its place: plugs swapped")
+                self.fail_check(f"the {VANES[name][0]} moved in its place: plugs swapped")
 
 
 def _wider(span: tuple[float, float], value: float) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""A virtual walk round an aircraft, received as it is done: to practise, and for tests."""
+"""The radio stream of a virtual preflight walk, in its own time: for practice and for tests."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ class Window:
 
     @property
     def full(self) -> bool:
-        """Whether it spans all but a tenth of its time."""
+        """Whether its rows span at least nine tenths of its time."""
         return len(self._rows) > 2 and self._rows[-1][0] - self._rows[0][0] > 0.9 * self.span_s
 
     def columns(self) -> list[list[float]]:

@@ -1,10 +1,10 @@
 """Servo outputs between two of their records: a servo keeps its last pulse until the next.
 
-Of outputs that are logged less often than they change, the pulses between are drawn on the cubic
-through four records, each standing until the next one: a step between two records is then where it
-was on average. A line through the records alone would move a surface before it was told to, by
-10 ms where every second of 50 pulses is logged. A line for the pulses between takes 3.5 % off a
-motion of 3 Hz, and Cm_alpha and Cm_de came out 9 % large; the cubic takes 0.4 %.
+Where outputs are logged less often than they change, the missing pulses are interpolated by the
+cubic through four records, and each is held until the next one. Straight lines through the records
+would move a surface before its command, by 10 ms where every second of 50 pulses a second is
+logged. Held pulses on a straight line lose 3.5 % of a motion of 3 Hz, which made Cm_alpha and
+Cm_de 9 % large; on the cubic they lose 0.4 %.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ import numpy as np
 from host.arrays import Array, IntArray
 from host.readers.signals import Signal
 
-STEP_S = 0.005  # of the rows that carry a held value: a fortieth of a short period of 5 Hz
-DENSE_HZ = 100.0  # logged as often, an output is taken as it is
-UNEVEN = 0.2  # of the way across four records: beyond it one is missing
-LONGEST_HOLD_S = 0.25  # behind it an output is unknown
+STEP_S = 0.005  # step of rows that repeat a held value: a fortieth of a 5 Hz short period
+DENSE_HZ = 100.0  # an output logged at this rate or more is not interpolated
+UNEVEN = 0.2  # unevenness of four records, as a share of their span, above which one is missing
+LONGEST_HOLD_S = 0.25  # an output is unknown later than this after its last record
 
 
 def held_output(signal: Signal, period_s: float) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""What a log of an autopilot is good for, before anybody identifies: said first, and honestly."""
+"""Judge from rates and channels what can be identified from an autopilot's log."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ ANGLES = {"alpha_rad": "angle of attack", "beta_rad": "sideslip"}
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What a log is good for.
+    """What can be identified from a log, and the settings to change.
 
     Attributes
     ----------
     refusal : str
-        One true sentence why nothing can be identified; empty if something can.
+        Sentence with the reason why nothing can be identified; empty if something can.
     lines : list of str
         For people: vehicle, time in the air, rates, what is wrong.
     answers : list of (what, verdict)

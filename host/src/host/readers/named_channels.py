@@ -75,7 +75,7 @@ class Channels:
                 f"{name}: {int(wild.sum())} values that no aircraft has count as missing"
             )
         found = Signal(np.asarray(t_s, dtype=np.float64), clean, source, late_s)
-        if found.seen:
+        if found.has_values:
             self.signals[name] = found
 
 

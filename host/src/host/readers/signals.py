@@ -38,6 +38,6 @@ class Signal:
         return float(1.0 / np.median(steps)) if len(steps) else 0.0
 
     @property
-    def seen(self) -> bool:
+    def has_values(self) -> bool:
         """Return whether there is any value."""
         return bool(np.isfinite(self.values).any())

@@ -27,13 +27,13 @@ WRAP_US = float(1 << 32)
 OTHER_CLOCK_S = 1e9  # a time since boot is shorter than thirty years
 PORTION_BYTES = 8 << 20  # read at a time
 STAMP = "received_s"  # of the ground station, beside a message's own fields
-BOTH_CLOCKS = "ATTITUDE"  # says when the autopilot started, by the ground station's clock
+BOTH_CLOCKS = "ATTITUDE"  # has both clocks, so it dates the autopilot's start
 Fields = dict[str, NDArray[Any]]
 
 
 @dataclass(slots=True)
 class _Received:
-    """What came: parts of each kind of message of each system, and what was lost of each sender."""
+    """Received messages by kind and system, in parts, with the losses of each sender."""
 
     parts: dict[tuple[int, str], list[Fields]] = field(default_factory=dict)
     started_s: dict[int, list[Array]] = field(default_factory=dict)
@@ -51,7 +51,7 @@ class _Received:
         return found
 
     def take(self, system: int, name: str) -> Fields | None:
-        """Return all messages of a kind, and forget them: a log may have a gigabyte."""
+        """Return all messages of a kind and free their memory: a log may have a gigabyte."""
         parts = self.parts.pop((system, name), None)
         if parts is None:
             return None
@@ -164,7 +164,7 @@ def _fields(
     sent = places < frames.body_bytes[rows, None]  # MAVLink 2 leaves zeros at the end out
     body = np.where(sent, view[np.minimum(at, len(view) - 1)], np.uint8(0))
     table = np.ascontiguousarray(body).view(layout.payload)[:, 0]
-    # Outputs without a pulse are most of them; who has a clock of its own needs no other.
+    # Most outputs have no pulse; a message with its own clock needs no time of reception.
     part = {name: table[name].copy() for name in layout.fields
             if not name.startswith("servo") or table[name].any()}  # fmt: skip
     if "time_usec" in part and np.median(part["time_usec"]) * 1e-6 < OTHER_CLOCK_S:
@@ -177,7 +177,7 @@ def _fields(
 
 
 def _heartbeat(received: _Received, system: int) -> tuple[int, int] | None:
-    """Return kind of vehicle and of autopilot as a system says them; None if it is neither."""
+    """Return kind of vehicle and of autopilot from a system's heartbeat; None for other systems."""
     parts = received.parts.get((system, "HEARTBEAT"), [])
     beats = [
         (int(kind), int(autopilot))

@@ -1,4 +1,4 @@
-"""PX4 ULog by pyulog, with what pyulog does not say: where the log stops, and what cannot be."""
+"""PX4 ULog by pyulog, with checks that pyulog lacks: where messages stop, impossible values."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def _topic(name: str, data: Mapping[str, NDArray[Any]], damage: list[str]) -> Me
 
 
 def _read(name: str, key: str) -> bool:
-    """Return whether a field is of use: of the large topics only some are."""
+    """Return whether a field is read: of large topics only some are."""
     if name in LARGE:
         return key.partition("[")[0] in LARGE[name]
     return key not in ("timestamp", "timestamp_sample")

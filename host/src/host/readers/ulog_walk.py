@@ -1,6 +1,6 @@
-"""The messages of a ULog one behind the other, only by their heads: does the file end with one?
+"""Walk over the heads of a ULog's messages to find bytes that belong to none.
 
-pyulog takes a file that is cut for a whole one, and bytes that are no message silently.
+pyulog reports neither a cut file nor bytes that are no message.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from host.export.unfinished import unfinished
 from host.extras import install_hint
 from host.report.flight_geography import flight_geography
 from host.report.flight_mcap import write_flight_mcap
-from host.report.flight_reading import Wanted, read_flight
+from host.report.flight_reading import FlightRequest, read_flight
 from host.report.flight_tlog import write_flight_tlog
 from host.report.flight_ulog import write_flight_ulog
 from host.report.plotjuggler_layout import PREFIX, write_layout
@@ -30,7 +30,7 @@ _WITH_POINTS = {"kml", "kmz", "gpx"}  # formats that show test points
 class ExportRequest:
     """What to export; see ``host export --help``."""
 
-    wanted: Wanted
+    wanted: FlightRequest
     kinds: tuple[str, ...]
     output: Path | None = None
     rate_hz: float | None = None

@@ -53,7 +53,7 @@ Maneuvers = list[tuple[DetectedManeuver, Grade]]
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class FlightRequest:
     """What to read; see ``host plot --help``."""
 
     source: Path
@@ -65,7 +65,7 @@ class Wanted:
     maneuvers: bool = True  # whether test points are looked for
 
 
-def read_flight(wanted: Wanted) -> tuple[ShownFlight, Path]:
+def read_flight(wanted: FlightRequest) -> tuple[ShownFlight, Path]:
     """Read a flight with its maneuvers, events and losses; return the file it stood in too.
 
     Raises
@@ -87,7 +87,7 @@ def read_flight(wanted: Wanted) -> tuple[ShownFlight, Path]:
     return _of_log(wanted, path), path
 
 
-def _refuse(wanted: Wanted, path: Path, kind: str, options: tuple[str, ...]) -> None:
+def _refuse(wanted: FlightRequest, path: Path, kind: str, options: tuple[str, ...]) -> None:
     given = {
         "session": wanted.session, "file-id": wanted.file_id, "row-rate": wanted.row_rate_hz,
         "calibration": wanted.calibration, "sensor": wanted.sensors or None,
@@ -97,7 +97,7 @@ def _refuse(wanted: Wanted, path: Path, kind: str, options: tuple[str, ...]) -> 
             raise UsageError(f"{path}: {kind} has no --{option}; leave it out")
 
 
-def _of_log(wanted: Wanted, path: Path) -> ShownFlight:
+def _of_log(wanted: FlightRequest, path: Path) -> ShownFlight:
     log = read_log(
         path,
         session=wanted.session,
@@ -146,7 +146,7 @@ def _argument(log: FlightLog, word: str, number: int) -> str:
     return log.schema.word(table, number) if table and table in log.schema.enums else str(number)
 
 
-def _of_rows(wanted: Wanted, path: Path) -> ShownFlight:
+def _of_rows(wanted: FlightRequest, path: Path) -> ShownFlight:
     calibration = load_calibration(wanted.calibration)
     rows = read_rows(path)
     table = make_table(rows, calibration, wanted.row_rate_hz)
@@ -170,7 +170,7 @@ def _of_rows(wanted: Wanted, path: Path) -> ShownFlight:
     )
 
 
-def _of_autopilot(wanted: Wanted, path: Path) -> ShownFlight:
+def _of_autopilot(wanted: FlightRequest, path: Path) -> ShownFlight:
     flight = read_autopilot(path, dict(wanted.sensors))
     summary = finite(summarise_autopilot(flight))
     columns = flight.columns()
@@ -220,7 +220,7 @@ def _common_rows(columns: Mapping[str, Array]) -> dict[str, Array]:
     return out
 
 
-def _found_in(path: Path, wanted: Wanted) -> tuple[Maneuvers, list[str]]:
+def _found_in(path: Path, wanted: FlightRequest) -> tuple[Maneuvers, list[str]]:
     """Return the test points of a source whose sensors are slow, and drop out: what stands still
     counts as missing there, as in `host maneuvers`."""
     try:

@@ -11,14 +11,14 @@ from pathlib import Path
 from host.errors import ExitCode, UsageError
 from host.export.unfinished import unfinished
 from host.report.flight_page import flight_page
-from host.report.flight_reading import Wanted, read_flight
+from host.report.flight_reading import FlightRequest, read_flight
 
 
 @dataclass(frozen=True, slots=True)
 class PlotRequest:
     """What to draw; see ``host plot --help``."""
 
-    wanted: Wanted
+    wanted: FlightRequest
     output: Path | None = None
     full: bool = False
     pictures: tuple[Path, ...] = ()

@@ -13,7 +13,7 @@ from host.files.user_text import read_text
 from host.original.rows import looks_like_rows
 from host.preflight.preflight_sheet import sheet_beside, sheet_lines
 from host.readers.autopilot_flight import is_autopilot_log
-from host.report.flight_reading import Wanted, read_flight
+from host.report.flight_reading import FlightRequest, read_flight
 from host.report.plotting import page_file, write_text
 from host.report.provenance import hashes, versions
 from host.report.report_page import ReportParts, report_page
@@ -72,7 +72,7 @@ def write_report(request: ReportRequest) -> tuple[Path, Identification]:
         own = options["aircraft"]
         options["prior"] = own if has_coefficients(own) else None
     found = identify(request.sources, **options)
-    beside = None if options.get("methods") else _beside(request.sources, options, found)
+    beside = None if options.get("methods") else _second_method(request.sources, options, found)
     flights = [
         flight
         for source, calibration in zip(request.sources, request.calibrations, strict=True)
@@ -95,7 +95,7 @@ def write_report(request: ReportRequest) -> tuple[Path, Identification]:
     return target, found
 
 
-def _beside(
+def _second_method(
     sources: list[Path], options: Mapping[str, Any], found: Identification
 ) -> Identification | None:
     """Return the same flights by a second method, to stand beside the first; None if it has none.
@@ -118,22 +118,24 @@ def _flight(
     if source.suffix.lower() in _TABLES:
         return None
     try:
-        return read_flight(_wanted(source, calibration, options))[0]
+        return read_flight(_flight_request(source, calibration, options))[0]
     except HostError:
         if source.suffix.lower() in TEXT_KINDS:  # a table under another name
             return None
         raise
 
 
-def _wanted(source: Path, calibration: Path | None, options: Mapping[str, Any]) -> Wanted:
+def _flight_request(
+    source: Path, calibration: Path | None, options: Mapping[str, Any]
+) -> FlightRequest:
     if is_autopilot_log(source):
-        return Wanted(source, sensors=tuple(options.get("sensors", {}).items()))
+        return FlightRequest(source, sensors=tuple(options.get("sensors", {}).items()))
     rows = False
     if source.is_file():
         with source.open("rb") as file:
             rows = looks_like_rows(file.read(_HEAD_BYTES))
     rate_hz = options.get("row_rate_hz") if rows else None
-    return Wanted(source, calibration=calibration, row_rate_hz=rate_hz)
+    return FlightRequest(source, calibration=calibration, row_rate_hz=rate_hz)
 
 
 def _sheet(path: Path | None) -> tuple[str, list[str]] | None:

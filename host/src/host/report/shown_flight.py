@@ -18,7 +18,7 @@ GAP_STEPS = 1.5  # of the usual interval: beyond it a sample is missing
 
 @dataclass(frozen=True, slots=True)
 class Happening:
-    """Something at an instant: an event of the recorder, a lost range.
+    """An event of the recorder or a lost range, with its time.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class ShownFlight:
     shares : tuple of str
         Surfaces that are shares of full travel, not angles.
     notes : list of str
-        What could not be shown, and why.
+        Lines on what could not be shown, and why.
     position : mapping of str to (fixes,) array
         ``t_s``, ``latitude_deg``, ``longitude_deg``, ``height_m`` at GPS's own instants; empty
         without a fix.
@@ -104,7 +104,7 @@ def quality(score: float) -> str:
 
 
 def is_simulated(summary: Mapping[str, Any]) -> bool:
-    """Return whether the recorder of a log ran on a computer, which its identity says."""
+    """Return whether the recorder of a log ran on a computer, by its identity frame."""
     return any(one.get("board") in _NO_BOARDS for one in summary.get("sessions", ()))
 
 

@@ -72,7 +72,7 @@ def write_figure(
 
 
 def overview_figure(flight: ShownFlight) -> Any:
-    """Return the first strips of a flight as a figure, few points of each: for a write-up."""
+    """Return the first strips of a flight as a figure with few points, for the report."""
     known = {one.name: one for one in channels_of(flight)}
     strips = [[known[c] for c in one.channels] for one in strips_of(known) if one.on]
     mpl = _matplotlib()

@@ -1,4 +1,4 @@
-"""The way over ground as a picture: metres both ways, coloured and numbered by test point."""
+"""The ground track as a picture: metres east and north, test points coloured and numbered."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from host.source_arguments import add_log_arguments
-from host.verbs.plot import wanted_source
+from host.verbs.plot import flight_request
 
 _KINDS = ("tlog", "ulog", "kml", "kmz", "gpx", "mcap")
 _DESCRIPTION = """\
@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     from host.text import shown
 
     request = ExportRequest(
-        wanted_source(args), tuple(dict.fromkeys(args.to)), args.output, args.rate
+        flight_request(args), tuple(dict.fromkeys(args.to)), args.output, args.rate
     )
     _, said, code = export(request)
     print("\n".join(map(shown, said)))

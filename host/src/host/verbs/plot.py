@@ -60,12 +60,12 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--to", dest="to_s", type=float, metavar="S", help="end of the picture")
 
 
-def wanted_source(args: argparse.Namespace) -> Any:
-    """Return what `add_log_arguments` was given as `host.report.flight_reading.Wanted`."""
+def flight_request(args: argparse.Namespace) -> Any:
+    """Return what `add_log_arguments` was given as `host.report.flight_reading.FlightRequest`."""
     from host.readers.autopilot_flight import chosen_sensors
-    from host.report.flight_reading import Wanted
+    from host.report.flight_reading import FlightRequest
 
-    return Wanted(
+    return FlightRequest(
         source=source_or_newest(args.source),
         session=args.session,
         file_id=args.file_id,
@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
     pictures = tuple(path for path in (args.png, args.svg) if path is not None)
     strips = tuple(one for one in args.channels.split(",") if one)
     request = PlotRequest(
-        wanted_source(args), args.output, args.full, pictures, strips, (args.from_s, args.to_s)
+        flight_request(args), args.output, args.full, pictures, strips, (args.from_s, args.to_s)
     )
     done = plot(request)
     print("\n".join(map(shown, done.lines)))

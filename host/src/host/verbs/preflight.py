@@ -110,9 +110,9 @@ def _list(args: argparse.Namespace, aircraft: str, without: dict[str, str]) -> i
     from host.aircraft.linear_aircraft import load
     from host.errors import ExitCode
     from host.physical.calibration import load_calibration
-    from host.preflight.check_list import Wanted, check_list
+    from host.preflight.check_list import CheckListInputs, check_list
 
-    wanted = Wanted(load(aircraft), load_calibration(args.calibration), without=without)
+    wanted = CheckListInputs(load(aircraft), load_calibration(args.calibration), without=without)
     checks = check_list(wanted)
     if args.json:
         print(json.dumps([{"item": c.key, "title": c.title, "step": c.step} for c in checks]))

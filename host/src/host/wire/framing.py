@@ -38,7 +38,7 @@ def envelope(frame: bytes) -> bytes:
 
 
 @dataclass(slots=True)
-class Found:
+class EnvelopeScan:
     """Envelopes in a piece of stream.
 
     Parameters
@@ -59,7 +59,7 @@ class Found:
     pending_from: int = 0
 
 
-def find_envelopes(data: bytes | bytearray, *, ended: bool = False) -> Found:
+def find_envelopes(data: bytes | bytearray, *, ended: bool = False) -> EnvelopeScan:
     """Find the good envelopes of a stream.
 
     After a length out of range or a wrong CRC the search goes on from the byte behind the first
@@ -71,7 +71,7 @@ def find_envelopes(data: bytes | bytearray, *, ended: bool = False) -> Found:
     ended : bool
         No more will come: what still waits for bytes is a failed envelope too.
     """
-    found = Found()
+    found = EnvelopeScan()
     at, size, view = 0, len(data), memoryview(data)
     while True:
         sync = data.find(SYNC, at)
@@ -99,7 +99,7 @@ def find_envelopes(data: bytes | bytearray, *, ended: bool = False) -> Found:
     return found
 
 
-def _between(data: bytes | bytearray, found: Found) -> bytes:
+def _between(data: bytes | bytearray, found: EnvelopeScan) -> bytes:
     """Return the bytes that were skipped."""
     parts, at = [], 0
     for place in found.places:

@@ -56,11 +56,11 @@ def parse_schema(text: bytes) -> Schema:
     try:
         raw = json.loads(text.decode("ascii"), parse_constant=_no_number)
     except (ValueError, RecursionError) as error:
-        raise LogError(f"the log's schema is not the JSON it should be: {_said(error)}") from error
+        raise LogError(f"the log's schema is not the JSON it should be: {_quote(error)}") from error
     head = _table(raw, "the schema")
     if head.get("format") != _FORMAT or head.get("version") != _VERSION:
         raise LogError(
-            f"schema of format {_said(head.get('format'))} version {_said(head.get('version'))};"
+            f"schema of format {_quote(head.get('format'))} version {_quote(head.get('version'))};"
             f" this program reads {_FORMAT!r} version {_VERSION}: install a newer host tool"
         )
     columns = [_name(one, "a column") for one in _list(head.get("columns"), "columns")]
@@ -129,10 +129,10 @@ def _field(value: Mapping[str, Any]) -> Field:
     kind = value.get("type")
     match = _TYPE.fullmatch(kind) if isinstance(kind, str) else None
     if match is None:
-        _refuse(f"type {_said(kind)} of field {name}", f"one of {' '.join(TYPES)} char, or [n]")
+        _refuse(f"type {_quote(kind)} of field {name}", f"one of {' '.join(TYPES)} char, or [n]")
     unit = value.get("unit", "")
     if not isinstance(unit, str) or not _UNIT.fullmatch(unit):
-        _refuse(f"unit {_said(unit)} of field {name}", "at most 16 letters, digits, slashes")
+        _refuse(f"unit {_quote(unit)} of field {name}", "at most 16 letters, digits, slashes")
     delay = value.get("delay_us")
     if isinstance(delay, dict):
         delay = {
@@ -181,7 +181,7 @@ def _refuse(found: str, expected: str) -> NoReturn:
     raise LogError(f"the log's schema has {found}; expected {expected}: not written by this logger")
 
 
-def _said(value: object) -> str:
+def _quote(value: object) -> str:
     if isinstance(value, Exception):
         value = str(value)
     elif isinstance(value, list | dict):  # may be nested too deep to be shown
@@ -196,20 +196,26 @@ def _no_number(text: str) -> NoReturn:
 
 def _table(value: object, where: str) -> dict[str, Any]:
     if not isinstance(value, dict) or len(value) > _WORDS:
-        _refuse(f"{_said(value)} as {_said(where)}", f"a table of at most {_WORDS} entries")
+        _refuse(
+            f"{_quote(value)} as {_quote(where)}",
+            f"a table of at most {_WORDS} entries",
+        )
     return value
 
 
 def _list(value: object, where: str) -> list[Any]:
     if not isinstance(value, list) or len(value) > _WORDS:
-        _refuse(f"{_said(value)} as {_said(where)}", f"a list of at most {_WORDS} entries")
+        _refuse(
+            f"{_quote(value)} as {_quote(where)}",
+            f"a list of at most {_WORDS} entries",
+        )
     return value
 
 
 def _name(value: object, where: str) -> str:
     if not isinstance(value, str) or not _NAME.fullmatch(value):
         _refuse(
-            f"the name {_said(value)} ({_said(where)})",
+            f"the name {_quote(value)} ({_quote(where)})",
             "a small letter, then at most 31 small letters, digits, underscores",
         )
     return value
@@ -218,7 +224,7 @@ def _name(value: object, where: str) -> str:
 def _names(value: object, where: str, most: int) -> list[str]:
     names = [_name(one, where) for one in _list(value, where)]
     if len(names) > most:
-        _refuse(f"{len(names)} names in {_said(where)}", f"at most {most}")
+        _refuse(f"{len(names)} names in {_quote(where)}", f"at most {most}")
     _different(names, where)
     return names
 
@@ -229,7 +235,10 @@ def _maybe_name(value: object, where: str) -> str | None:
 
 def _whole(value: object, where: str, low: int, high: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        _refuse(f"{_said(value)} as {_said(where)}", f"a whole number from {low} to {high}")
+        _refuse(
+            f"{_quote(value)} as {_quote(where)}",
+            f"a whole number from {low} to {high}",
+        )
     return value
 
 
@@ -240,12 +249,12 @@ def _maybe_whole(value: object, where: str, low: int, high: int) -> int | None:
 def _number(value: object, where: str, low: float, high: float) -> float:
     if isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high:
         return float(value)
-    _refuse(f"{_said(value)} as {_said(where)}", f"a number from {low:g} to {high:g}")
+    _refuse(f"{_quote(value)} as {_quote(where)}", f"a number from {low:g} to {high:g}")
 
 
 def _different(values: Iterable[object], where: str) -> None:
     seen: set[object] = set()
     for value in values:
         if value in seen:
-            _refuse(f"{_said(where)} {_said(value)} twice", "each once")
+            _refuse(f"{_quote(where)} {_quote(value)} twice", "each once")
         seen.add(value)

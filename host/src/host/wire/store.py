@@ -45,7 +45,7 @@ class FrameStore:
         self._frames: dict[str, FrameSet] | None = None
 
     @property
-    def kept(self) -> bool:
+    def in_memory(self) -> bool:
         """True if the identification frames are held in memory."""
         return len(self.blocks) <= KEEP_BLOCKS
 
@@ -90,7 +90,7 @@ class FrameStore:
             slow: dict[str, list[FrameSet]] = {
                 name: [] for name in self.schema.by_name if name != FAST
             }
-            if self.kept and FAST in self.schema.by_name:
+            if self.in_memory and FAST in self.schema.by_name:
                 size = self.schema.by_name[FAST].size_bytes
                 most = int(self.blocks.used.sum(dtype=np.int64)) // size + 1
                 fast = join(self.schema, FAST, self._sorted_out([*slow, FAST], slow), most)

@@ -210,7 +210,7 @@ class StreamStore(FrameStore):
         self._data = stream.data
 
     @property
-    def kept(self) -> bool:
+    def in_memory(self) -> bool:
         """Always True: the stream is held in memory."""
         return True
 

@@ -45,7 +45,7 @@ def _cause(model: TypeModel, name: str, effect: TypeEffect) -> str:
         "fly more flights of each, they differ": (
             0.0 if math.isnan(effect.within.value) else effect.within.value**2
         ) / data.flights,
-        "fly longer or larger maneuvers for it: a flight alone tells little": own,
+        "fly longer or larger maneuvers for it: one flight has a wide interval": own,
         "calibrate each instrument better": sum(
             (data.local**2).sum(axis=1).tolist()
         ) / data.flights / data.fleet,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from host.fleet.dataset.flight_store import FlightStore
 from host.fleet.fleet_error import FleetError
 from host.fleet.flight_task import IDENTIFIED, SET_ASIDE, TaskLimits
-from host.fleet.sources.flight_keys import FleetSources, counted
+from host.fleet.sources.flight_keys import FleetSources, tasks_by_key
 from host.fleet.tasks.task_cluster import ClusterOptions, run_tasks
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def run_fleet(
     store = FlightStore(output)
     store.compact()
     sources.hashes = store.read_hashes()
-    tasks = counted(sources.tasks())
+    tasks = tasks_by_key(sources.tasks())
     store.write_hashes(sources.hashes)
     if retry:
         store.drop(lambda row: row["state"] == SET_ASIDE)

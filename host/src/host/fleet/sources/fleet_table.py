@@ -70,7 +70,7 @@ def read_table(path: Path) -> list[TableRow]:
                 f"{path}: line {number}: date {cells['date']!r}, expected such as 2026-11-23"
             )
         for name in _PATHS:
-            cells[name] = _beside(path, cells[name])
+            cells[name] = _relative_to_table(path, cells[name])
         if cells["source"] and not is_address(cells["source"]):
             cells["source"] = (path.parent / cells["source"]).as_posix()
         rows.append(TableRow(**cells))
@@ -114,7 +114,7 @@ def _plain(source: str) -> str:
     return source if is_address(source) else Path(source).absolute().as_posix()
 
 
-def _beside(table: Path, name: str) -> str:
+def _relative_to_table(table: Path, name: str) -> str:
     """Return a file's path from the table's folder, or a name that is no file there."""
     beside = table.parent / name
     return beside.as_posix() if name and beside.is_file() else name

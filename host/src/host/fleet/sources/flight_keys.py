@@ -139,6 +139,6 @@ def _absolute(name: str) -> str:
     return str(Path(name).resolve()) if name and Path(name).is_file() else name
 
 
-def counted(tasks: Iterable[FlightTask]) -> dict[str, FlightTask]:
+def tasks_by_key(tasks: Iterable[FlightTask]) -> dict[str, FlightTask]:
     """Return tasks by key: the same log given twice is one flight."""
     return {task.key: task for task in tasks}

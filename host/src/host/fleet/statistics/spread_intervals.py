@@ -203,7 +203,7 @@ def _between_interval(
 
 def _likely_upper(data: FleetEstimates, within: float) -> float:
     """Return the upper end where aircraft are more alike than chance makes them in 39 of 40 fleets:
-    no variance has such squares, and that none is negative tells no more than the likelihood."""
+    no variance has such squares, so the bound comes from the likelihood alone."""
     limit = reduced(data, 0.0, within).deviance + CHI_SQUARE_95
     return _where(lambda x: limit - reduced(data, x, within).deviance, 0.0, data.grain, 0.0)
 

@@ -3,7 +3,8 @@
 alpha_zero_rad, beta_zero_rad    vane reading at zero normal force, and at zero side force
 elevator_slope                   position by the pot over the pulse, rad/us; aileron, rudder
 elevator_lag_s                   by which the position is behind the pulse; aileron, rudder
-servo_lag_s                      the same of all, where no pot measures and the answer tells it
+servo_lag_s                      one lag of all servos, estimated in the answer where no pot
+measures
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ def with_watched(flight: LoadedFlight) -> LoadedFlight:
 
 def flight_spread(flights: Sequence[LoadedFlight], name: str) -> float:
     """Return the standard deviation of a quantity between flights of an aircraft, by restricted
-    likelihood; 0 where one aircraft alone tells it.
+    likelihood; 0 where only one aircraft has it.
 
     Parameters
     ----------

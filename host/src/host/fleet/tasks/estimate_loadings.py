@@ -60,7 +60,7 @@ def coefficient_loadings(fit: CoefficientFit, errors: InstrumentErrors) -> Loade
     errors : InstrumentErrors
     """
     count = len(fit.derivatives)
-    return parted(
+    return split_covariance(
         tuple(d.name for d in fit.derivatives),
         np.array([d.value for d in fit.derivatives]),
         fit.covariance[:count, :count],
@@ -69,7 +69,7 @@ def coefficient_loadings(fit: CoefficientFit, errors: InstrumentErrors) -> Loade
     )
 
 
-def parted(
+def split_covariance(
     names: tuple[str, ...],
     values: Array,
     total: Array,

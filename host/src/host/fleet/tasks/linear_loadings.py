@@ -12,7 +12,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.constants import NORMAL_95
-from host.fleet.tasks.estimate_loadings import LoadedEstimates, parted
+from host.fleet.tasks.estimate_loadings import LoadedEstimates, split_covariance
 from host.instrument.error_labels import ERROR_LABELS
 from host.instrument.instrument_errors import InstrumentErrors
 from host.sysid.aerodynamics.coefficient_table import QBAR, SHARED, VANE, CoefficientParts
@@ -57,7 +57,7 @@ def linear_loadings(answers: Sequence[Answer], errors: InstrumentErrors) -> Load
                 own[here, here] += np.outer(shift, shift)
     values = np.concatenate([parts.values for parts in estimated]) if estimated else np.zeros(0)
     total = own + sum((np.outer(s, s) for s in shifts.values()), np.zeros_like(own))
-    return parted(names, values, total, shifts, errors)
+    return split_covariance(names, values, total, shifts, errors)
 
 
 def _shifts(parts: CoefficientParts) -> dict[str, Array]:

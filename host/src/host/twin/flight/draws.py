@@ -185,7 +185,7 @@ def _random_values(
     return np.asarray(value)
 
 
-def flown(aircraft: Aircraft, draws: Draws) -> Airframe:
+def true_airframe(aircraft: Aircraft, draws: Draws) -> Airframe:
     """Return the aircraft as it really is on this flight."""
     frame = aircraft.airframe()
     ix, iy, iz = (1.0 + draws.vector("inertia_share")).tolist()

@@ -33,7 +33,7 @@ from host.aircraft.rigid_body import rotate_to_body, rotate_to_ned, step
 from host.aircraft.trim import Trim, solve
 from host.compiled import compiled_fast
 from host.instrument.instrument_errors import InstrumentErrors
-from host.twin.flight.draws import GROUPS, Draws, draw, flown
+from host.twin.flight.draws import GROUPS, Draws, draw, true_airframe
 from host.twin.flight.pilot import NOWHERE_M, SWITCH_DIRECT_US, Schedule, gains, schedule
 from host.twin.testcard.cards import Card
 
@@ -331,7 +331,7 @@ def fly(
             None if instrument_seed is None else np.random.default_rng([instrument_seed, 4])
         ),
     )
-    frame = flown(plane, draws)
+    frame = true_airframe(plane, draws)
     atmosphere = air_model.atmosphere(
         card.flight.field_pressure_pa, card.flight.field_temperature_degc
     )

@@ -164,7 +164,7 @@ def _record(
             sitl.set_clock_offset(offset_us & 0xFFFFFFFF)
     cuts = [round(f.at_s * TICKS_PER_S) for f in faults if f.kind == "power_cut"]
     end = min([given.duration, *cuts])
-    give(sitl, given, end)
+    give_stimuli(sitl, given, end)
     if "telemetry_flood" in kinds:
         raise UsageError("telemetry_flood: here an interrupt takes no time; use --firmware avr")
     actions = [(round(a.at_s * TICKS_PER_S), a) for a in recorder_actions(faults)]
@@ -284,7 +284,7 @@ def configure(sitl: Sitl, rate_hz: int, aircraft: str, *, damaged: bool = False)
         sitl.set_eeprom(bytes(content))
 
 
-def give(sitl: Sitl, given: Stimuli, end: int) -> None:
+def give_stimuli(sitl: Sitl, given: Stimuli, end: int) -> None:
     """Give the stimuli that reach the pins before tick `end`; the next power-on is at the bench."""
     edges, gps = given.edges[given.edges["at"] < end], given.gps[given.gps["at"] < end]
     sitl.add_edges(edges["at"], edges["levels"])

@@ -75,7 +75,7 @@ def radio(
         if flight_card:  # before the card is in: a power-on of its own writes it
             instrument.set_eeprom(eeprom_with_card(instrument.eeprom(), flight_card))
         instrument.insert_card(image, sitl.CARD_ID)
-        sitl.give(instrument, given, given.duration)
+        sitl.give_stimuli(instrument, given, given.duration)
         instrument.power_on()
         sent = 0
         for at in range(0, given.duration, round(step_s * TICKS_PER_S)):
