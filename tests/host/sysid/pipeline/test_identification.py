@@ -99,7 +99,7 @@ def test_the_table_has_every_estimate_with_its_unit(one: Identification) -> None
     assert (judged.loc[judged["verdict"] == "trust", "relative_half_width"] <= 0.1).all()
     assert judged.loc["Cn_p", "widened_by"] == "IMU tilt and vane zero about y"
     assert table.loc[("longitudinal", "Cm_de"), "widened_by"] == "Iyy"
-    assert table.loc[("longitudinal", "Cm_q"), "widened_by"] == "delay of the vanes"
+    assert table.loc[("longitudinal", "Cm_q"), "widened_by"] == "Iyy"
     assert not table["widened_by"].str.contains("_").any()
 
 

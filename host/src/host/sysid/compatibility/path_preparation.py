@@ -121,6 +121,13 @@ def prepare_path_problem(
     return problem, [_lagged_inputs(columns, cut, block) for cut in cuts], when
 
 
+def vane_delay_by_file(i: SensorErrorModel, columns: Mapping[str, Array]) -> tuple[float, float]:
+    """Return the vanes' delay by the aircraft file, 2 damping / omega, and its deviation, s."""
+    omega = 2.0 * np.pi * i.vane_hz_per_mps * float(np.median(columns[AIR[0]]))
+    nominal = 2.0 * i.vane_damping / omega
+    return nominal, vane_delay_s(i, nominal)
+
+
 def prior(
     instrument: SensorErrorModel | None, *, vanes: bool = True
 ) -> dict[str, tuple[float, float]]:

@@ -15,7 +15,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.constants import NORMAL_95
-from host.instrument.deviations import SensorErrorModel, vane_delay_s
+from host.instrument.deviations import SensorErrorModel
 from host.instrument.deviations import deviations as prior_deviations
 from host.instrument.recording import SURFACES
 from host.sysid.compatibility.flight_path import AIR, DELAYS
@@ -23,6 +23,7 @@ from host.sysid.compatibility.path_preparation import (
     NO_OFFSETS,
     compensate_friction,
     compensate_lowpass,
+    vane_delay_by_file,
 )
 from host.sysid.compatibility.position_correction import transfer_to_cg
 from host.sysid.compatibility.reconstruction import Compatibility
@@ -91,13 +92,11 @@ def invert_vane_dynamics(
 def vane_delay_of(
     found: Compatibility, i: SensorErrorModel, columns: Mapping[str, Array]
 ) -> tuple[float, float]:
-    """Return the vanes' delay and its deviation, s: reconstructed, else 2 zeta / omega."""
+    """Return the vanes' delay and its deviation, s: reconstructed, else by the aircraft file."""
     estimated = next((f for f in found.findings if f.name == VANE_DELAY and f.data_informed), None)
     if estimated is not None:
         return estimated.value, estimated.half_width / NORMAL_95
-    omega = 2.0 * np.pi * i.vane_hz_per_mps * float(np.median(columns[AIR[0]]))
-    nominal = 2.0 * i.vane_damping / omega
-    return nominal, vane_delay_s(i, nominal)
+    return vane_delay_by_file(i, columns)
 
 
 def residual_errors(found: Compatibility, columns: Mapping[str, Array]) -> dict[str, float]:
