@@ -1,7 +1,7 @@
 """Coefficients of a linear answer from its dimensional derivatives, with intervals.
 
-Conversions are at the trim of the maneuvers. The uncertainty of mass, inertia, dynamic pressure and
-reference sizes is added to that of the fit.
+Conversions are at the trim of the maneuvers, thrust taken off. The uncertainty of mass, inertia,
+dynamic pressure and reference sizes is added to that of the fit.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from host.constants import NORMAL_95
 from host.instrument.deviations import dynamic_pressure_share
 from host.instrument.error_labels import ERROR_LABELS
 from host.instrument.instrument_errors import InstrumentErrors, standard_errors
+from host.sysid.aerodynamics.path_thrust import PathThrust
 from host.sysid.models.consider_covariance import consider_covariance, dominant_error_source
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.templates import Trim
@@ -90,6 +91,7 @@ def coefficient_parts(
     condition: Condition,
     shifts: Sequence[ShiftedEstimate] = (),
     errors: InstrumentErrors | None = None,
+    thrust: PathThrust | None = None,
 ) -> CoefficientParts:
     """Convert dimensional derivatives of the templates to coefficients.
 
@@ -105,11 +107,21 @@ def coefficient_parts(
         Of the derivatives, by one deviation of each sensor error.
     errors : InstrumentErrors, optional
         What the pitots may be wrong by, where `shifts` has nothing of them; standard ones without.
+    thrust : PathThrust, optional
+        Of the maneuvers, which is in the derivatives; none without.
     """
+    pull = thrust or PathThrust(0.0, 0.0)
 
-    def converted(derivatives: Array, a: AirframeData, at: Condition) -> Array:
+    def in_proportion(derivatives: Array, a: AirframeData, at: Condition) -> Array:
         table = from_dimensional(dict(zip(result.names, derivatives.tolist(), strict=True)), a, at)
         return np.array([table[name] for name in names])
+
+    def converted(
+        derivatives: Array, a: AirframeData, at: Condition, pull: PathThrust = pull
+    ) -> Array:
+        by_thrust = pull.in_derivatives(a.mass_kg, at.airspeed_mps)
+        of_thrust = np.array([by_thrust.get(name, 0.0) for name in result.names])
+        return in_proportion(derivatives - of_thrust, a, at)
 
     names = list(
         from_dimensional(
@@ -119,12 +131,15 @@ def coefficient_parts(
     value = converted(result.estimate, airframe, condition)
     # Coefficients go with derivatives in proportion.
     slopes = np.stack(
-        [converted(row, airframe, condition) for row in np.eye(len(result.names))], axis=1
+        [in_proportion(row, airframe, condition) for row in np.eye(len(result.names))], axis=1
     )
     assumed: dict[str, Array] = {
         cause: (converted(result.estimate, a, at) - value) / PERTURBATION * share
         for cause, (share, a, at) in _perturbed_mass_properties(airframe, condition).items()
     }
+    if pull.deviation_n > 0.0:
+        more = replace(pull, along_n=pull.along_n + pull.deviation_n)
+        assumed[THRUST] = converted(result.estimate, airframe, condition, more) - value
     if not any(SHARED.get(m.error) == QBAR for m in shifts):
         # Coefficients go with dynamic pressure inversely.
         assumed[QBAR] = -value * dynamic_pressure_share(
@@ -193,7 +208,7 @@ def _variances(assumed: dict[str, Array], sensed: dict[str, list[Array]]) -> dic
 
 
 PERTURBATION = 1e-4  # share by which a mass property is changed for its sensitivity
-QBAR, VANE = "dynamic pressure", "vanes"
+QBAR, VANE, THRUST = "dynamic pressure", "vanes", "thrust"
 ANGLES = ("alpha_rad", "beta_rad")
 SHARED = {"pitot_scale": QBAR, "pitot_zero_pa": QBAR, "alpha_scale": VANE, "beta_scale": VANE}
 

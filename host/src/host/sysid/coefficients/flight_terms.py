@@ -14,8 +14,8 @@ import numpy as np
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
+from host.sysid.aerodynamics.measured_thrust import thrust_column
 from host.sysid.coefficients.coefficient_model import DRAG, CoefficientModel
-from host.sysid.coefficients.measured_thrust import thrust_column
 from host.sysid.coefficients.window_spectra import Window
 from host.sysid.identification_error import IdentificationError
 

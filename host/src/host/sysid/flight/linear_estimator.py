@@ -23,6 +23,7 @@ from host.sysid.aerodynamics.coefficient_table import (
     coefficients,
     trim_of,
 )
+from host.sysid.aerodynamics.path_thrust import path_thrust
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_corrections import corrections
 from host.sysid.compatibility.sensor_dynamics import IMU_DELAY, SERVO_DELAY
@@ -321,7 +322,10 @@ class LinearEstimator:
         if self.airframe is not None and e.trim.known:
             own = e.used[0].flight.instrument
             errors = own.errors if own is not None else None
-            found = coefficient_parts(statistical, self.airframe, e.condition, shifts, errors)
+            thrust = path_thrust(e.cuts, self.powerplant, self.airframe, e.trim, e.condition)
+            found = coefficient_parts(
+                statistical, self.airframe, e.condition, shifts, errors, thrust
+            )
         return LinearIntervals(
             statistical, coherence, shifts, add_systematic_covariance(statistical, shifts), found
         )

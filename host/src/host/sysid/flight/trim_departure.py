@@ -26,6 +26,7 @@ from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
+from host.sysid.aerodynamics.path_thrust import rotor_means
 from host.sysid.aerodynamics.varying_airspeed import MEASURED, SECOND_ORDER_TERMS, VaryingModel
 from host.sysid.estimators.gust_model import gust_deviation_mps
 from host.sysid.flight.one_step import one_step_of
@@ -268,14 +269,8 @@ def spin_of(
     powerplant: Powerplant | None, cuts: Sequence[Mapping[str, Array]]
 ) -> tuple[float, float]:
     """Return the mean angular momentum of the rotor along x and z, kg m2/s."""
-    wanted = ("throttle", "airspeed_mps", "density_kgpm3")
-    if powerplant is None or not all(name in cuts[0] for name in wanted):
+    means = rotor_means(powerplant, cuts)
+    if powerplant is None or means is None:
         return NO_SPIN
-    speeds = []
-    for c in cuts:
-        dt_s = float(c["t_s"][1] - c["t_s"][0])
-        throttle, airspeed_mps, density_kgpm3 = (c[name] for name in wanted)
-        _, spin, _ = powerplant.run(throttle, airspeed_mps, density_kgpm3, dt_s)
-        speeds.append(float(np.mean(spin[len(spin) // 4 :])))  # the first of it is settling
-    momentum = powerplant.rotor_kgm2 * float(np.mean(speeds)) * powerplant.axis
+    momentum = powerplant.rotor_kgm2 * means[1] * powerplant.axis
     return float(momentum[0]), float(momentum[2])

@@ -46,10 +46,9 @@ class Models:
 
     @property
     def signals(self) -> tuple[str, ...]:
-        """Inputs and outputs of the user's own models; measured thrust of coefficients."""
+        """Inputs and outputs of the user's own models; thrust where it was measured."""
         own = {s for _, m in self.linear if m is not None for s in (*m.inputs, *m.outputs)}
-        own |= set(THRUST) if self.coefficients else set()
-        return tuple(sorted(own - {CONSTANT}))
+        return tuple(sorted((own | set(THRUST)) - {CONSTANT}))
 
 
 def requested_models(given: ModelName | Iterable[ModelName] | None) -> Models:
