@@ -159,3 +159,19 @@ def test_coefficients_of_a_calm_flight_hold_with_its_file() -> None:
         for row in rows:
             estimate, half, true = (float(str(row[k])) for k in ("estimate", "half_width", "true"))
             assert abs(estimate - true) < half < 0.1 * abs(true), row
+
+
+def test_air_that_pitches_and_rolls_is_answered_with_care_by_coefficients() -> None:
+    """Refused before: least squares, the first round, found an aircraft that diverges."""
+    air = independent.cells()["karman, turning, spread, 0.5 m/s"]
+    answer = independent.answer_with_file(air, 14321).coefficients
+    assert answer is not None
+    assert any("air that pitches or rolls" in remark for remark in answer.remarks)
+    found = {c.name: c for c in answer.coefficients}
+    for name in ("Cm_alpha", "Cm_q", "Cl_p", "Cl_da"):
+        true, c = float(getattr(TRAINER, name)), found[name]
+        assert abs(c.value - true) < c.half_width, name
+        assert 0.1 * abs(true) < c.half_width < abs(true), name
+    calm = independent.answer_with_file(independent.cells()["calm"], 14321).coefficients
+    assert calm is not None
+    assert not any("air that" in remark for remark in calm.remarks)

@@ -3,7 +3,10 @@
 A linear model with the coefficients found so far is driven by the measured surfaces. Its signals
 are correlated with the inputs but not with gusts and sensor noise, so an estimate with regressors
 of this simulation as instrumental variables is not biased by either (Ljung, System Identification,
-sec. 7.6; Soderstrom & Stoica, Instrumental Variable Methods, 1983). They need not be exact.
+sec. 7.6; Soderstrom & Stoica, Instrumental Variable Methods, 1983). They need not be exact, but
+they must not run away: where air pitches or rolls, the first coefficients, found without them, make
+an aircraft that does, and so may those of an aircraft that an autopilot holds. Its growing motions
+die away instead.
 """
 
 from __future__ import annotations
@@ -24,12 +27,27 @@ from host.sysid.numerics.recursion import simulate
 
 LEVELLING_PERS = 0.3  # the pilot brings the wings back
 MEAN_DRAG = 0.04  # the mean of a force is removed again
+MARGIN_PERS = 1e-3
+SLOWEST_PERS = 0.1  # a motion that dies away more slowly than a maneuver lasts
+
+
+def stabilised(A: Array) -> Array:
+    """Return a motion (n, n) whose growing or standing roots decay as fast as they grew, others
+    as they are."""
+    roots, vectors = np.linalg.eig(A)
+    growing = roots.real > -MARGIN_PERS
+    if not growing.any():
+        return A
+    decay = np.maximum(np.abs(roots.real), SLOWEST_PERS)
+    mirrored = np.where(growing, -decay + 1j * roots.imag, roots)
+    return np.ascontiguousarray(((vectors * mirrored) @ np.linalg.pinv(vectors)).real)
 
 
 def _simulate(A: Array, B: Array, inputs: Array, dt_s: float) -> Array:
-    """Return states (samples, n) of x' = A x + B u from rest."""
-    if np.max(np.linalg.eigvals(A).real) > -1e-3:
-        raise IdentificationError("the coefficients found so far make an unstable aircraft")
+    """Return states (samples, n) of x' = A x + B u from rest, A stabilised."""
+    if not (np.isfinite(A).all() and np.isfinite(B).all()):
+        raise IdentificationError("the coefficients found so far are not finite")
+    A = stabilised(A)
     middle = 0.5 * (inputs + np.vstack([inputs[1:], inputs[-1:]]))
     n, m = B.shape
     AB = np.hstack([A, B, np.zeros((n, 1))])

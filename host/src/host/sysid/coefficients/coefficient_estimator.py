@@ -264,7 +264,8 @@ class CoefficientEstimator:
         )
         axes = {w.longitudinal for w in terms.windows}
         used = tuple(f for f in found if (f.axis == "elevator_rad") in axes)
-        return CoefficientEstimate(search, used, terms.windows, terms.remarks)
+        remarks = (*terms.remarks, *_moving_air(search))
+        return CoefficientEstimate(search, used, terms.windows, remarks)
 
 
 def coefficient_estimator(
@@ -333,6 +334,17 @@ def merged_windows(found: Sequence[DetectedManeuver]) -> list[Window]:
                 continue
         windows.append(Window(first, last, along))
     return windows
+
+
+def _moving_air(search: SearchResult) -> list[str]:
+    """Return a remark where air pitched or rolled; it is in no equation but as noise."""
+    parts = [f"{n} {100.0 * share:.0f} %" for n, share in search.least_squares_shares.items()]
+    if not parts:
+        return []
+    return [
+        f"air that pitches or rolls: least squares would find {', '.join(parts)} of these;"
+        " intervals are widened, use with care"
+    ]
 
 
 def _airborne_samples(columns: Mapping[str, Array], settled_s: float) -> slice:

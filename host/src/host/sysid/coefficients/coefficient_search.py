@@ -181,6 +181,7 @@ def _search(problem: FlightProblem, sd: Array, known_noise: ResidualSpectra) -> 
     )  # fmt: skip
     known = problem.error_names  # of servos and clock only where the flight has such errors
     considered = np.array([known.index(n) for n in CONSIDERED if n in known])
+    by_round: list[Array] = []
     for round_ in range(COEFFICIENT_ROUNDS + JOINT_ROUNDS):
         data, spectra = _linearise(problem, iterate, sd, round_)
         gusts = sum(values.shape[1] for values in spectra[0].gusts.values())
@@ -201,6 +202,7 @@ def _search(problem: FlightProblem, sd: Array, known_noise: ResidualSpectra) -> 
         )
         final = FinalStep(blocks, solution, unknowns, iterate.noise, data.spectra)
         iterate.theta = iterate.theta + solution.step[: unknowns.coefficients]
+        by_round.append(iterate.theta)
         iterate.errors = iterate.errors + solution.step[unknowns.first_error :]
         residuals = (
             ((block.equation, block.window), block.residual_after(solution.step))
@@ -213,8 +215,9 @@ def _search(problem: FlightProblem, sd: Array, known_noise: ResidualSpectra) -> 
     # whatever noise the data have.
     prior_weight = np.divide(inverse_variance, 1.0 / sd, out=np.zeros_like(sd), where=sd > 0.0)
     shifts = -final.solution.inverse[:, final.unknowns.first_error :] * prior_weight
+    moved = by_round[COEFFICIENT_ROUNDS - 1] - by_round[0]  # both without sensor errors
     return SearchResult(
-        problem, iterate.theta, iterate.errors, iterate.level_slopes, final, sd, shifts
+        problem, iterate.theta, iterate.errors, iterate.level_slopes, final, sd, shifts, moved
     )
 
 
