@@ -13,7 +13,7 @@ from host.instrument.deviations import SensorErrorModel, deviations, sensor_erro
 from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
 from host.sysid.coefficients.coefficient_search import fit_coefficients
-from host.sysid.coefficients.window_spectra import Window
+from host.sysid.coefficients.window_spectra import Window, window_transform
 from host.sysid.compatibility.inverse_sensor_model import Record, apply_sensor_errors, usable_length
 from host.sysid.flight.even_grid import even_columns
 from host.sysid.flight.maneuver_detection import DetectedManeuver
@@ -177,6 +177,15 @@ def test_what_is_missing_is_named() -> None:
     empty: dict[str, np.ndarray] = {"t_s": np.arange(10.0)}
     with pytest.raises(IdentificationError, match="alpha_rad"):
         fit_coefficients(empty, [], airframe_data(NAME), sensor_error_model(NAME), powerplant(NAME))
+
+
+def test_a_window_of_two_seconds_may_miss_a_sample_on_the_grid_of_the_fit() -> None:
+    """A maneuver at the end of a record, 2.0 s long, ended the work: "2 s needed"."""
+    step_s = 2.0 / 66.4
+    window = Window(98.0, 100.0, longitudinal=False)
+    assert len(window_transform(np.arange(66), step_s, window, ("CL", "CD")).frequency_hz) > 5
+    with pytest.raises(IdentificationError, match="2 s needed"):
+        window_transform(np.arange(65), step_s, window, ("CL", "CD"))
 
 
 def test_a_flight_of_two_seconds_is_refused_in_one_line() -> None:
