@@ -21,6 +21,12 @@ GIVEN = ("x", "u", "p", "c", "t")  # states, inputs, parameters, constants, tabl
 FUNCTIONS = ("rates", "rate_slopes", "readings", "reading_slopes")
 
 
+def of_equations(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Mark what calls `FUNCTIONS` by their names for other templates (`EquationCode.loop`)."""
+    function.__dict__["of_equations"] = True
+    return function
+
+
 @dataclass(frozen=True)
 class EquationNodes:
     """Equations as nodes of a graph, and what they may depend on.
@@ -121,16 +127,19 @@ class EquationCode:
         """Return a kernel from a function that calls those of `FUNCTIONS` by their names.
 
         It is the template's code with these equations in the place of those names, and is kept
-        with them: several models may use one template.
+        with them: several models may use one template. So is a part that `of_equations` marks.
         """
         if template.__name__ not in self._loops:
             self._loops[template.__name__] = self._bound(template)
         return self._loops[template.__name__]
 
-    def _bound(self, template: Callable[..., Any]) -> Kernel[..., Any]:
+    def _bound(self, template: Callable[..., Any], *, part: bool = False) -> Kernel[..., Any]:
         code = template.__code__.replace(co_filename=str(self.path))
-        places = {**template.__globals__, **self._parts}
+        known = template.__globals__
+        marked = [name for name in code.co_names if hasattr(known.get(name), "of_equations")]
+        parts = {name: self._bound(known[name], part=True) for name in marked}
+        places = {**known, **self._parts, **parts}
         bound = FunctionType(code, places, template.__name__)
         bound.__module__ = self.path.stem
         bound.__qualname__ = template.__name__
-        return Kernel(bound, reordered=False)
+        return Kernel(bound, reordered=False, part=part)

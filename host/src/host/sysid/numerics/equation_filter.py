@@ -12,11 +12,15 @@ import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
 from host.compiled import compiled_part
+from host.sysid.expressions.equation_code import of_equations
 from host.sysid.numerics.equation_recursion import (
     STATE_LIMIT,
     rate_slopes,
+    rates,
     reading_slopes,
 )
+
+SERIES_ORDER = 4  # of the transition over a step, as of the step itself
 
 
 @compiled_part
@@ -31,6 +35,13 @@ def input_at(inputs: Array, position: float, ramp: float, u: Array) -> None:
 
 
 @compiled_part
+def input_within(inputs: Array, k: int, share: float, ramp: float, u: Array) -> None:
+    """Write the inputs within the step behind sample `k` into `u`."""
+    for j in range(inputs.shape[1]):
+        u[j] = inputs[k, j] + ramp * share * (inputs[k + 1, j] - inputs[k, j])
+
+
+@compiled_part
 def multiply(a: Array, b: Array, out: Array) -> None:
     """Write a b into `out`; of so small matrices a tenth of what `numpy.dot` takes."""
     for i in range(a.shape[0]):
@@ -41,6 +52,149 @@ def multiply(a: Array, b: Array, out: Array) -> None:
             if x != 0.0:
                 for j in range(b.shape[1]):
                     out[i, j] += x * b[k, j]
+
+
+@of_equations
+def step_along(
+    x: Array,
+    h: float,
+    u: Array,
+    p: Array,
+    c: Array,
+    t: Array,
+    bias: Array,
+    column: IntArray,
+    bias_column: IntArray,
+    work: Array,
+    fx: Array,
+    fu: Array,
+    fp: Array,
+    B: Array,
+    E: Array,
+    S: Array,
+) -> None:
+    """Step the states by `h` seconds, which may be negative.
+
+    `S` (n, L) is overwritten by their slopes by states and unknowns before the step, a series of
+    the slopes of the rates in its middle, which are left in `fx`. `u` (3, m) are the inputs at
+    begin, middle and end; `work` (3, n) is left with the rates at the end in row 0; `B` and `E`
+    (n, L) are work.
+    """
+    n, L = S.shape
+    f, stage, total = work[0], work[1], work[2]
+    for i in range(n):
+        stage[i] = x[i]
+        total[i] = 0.0
+    for number in range(4):
+        at = (number + 1) // 2
+        if number == 1:
+            rate_slopes(stage, u[at], p, c, t, f, fx, fu, fp)
+        else:
+            rates(stage, u[at], p, c, t, f)
+        weight = 1.0 if number == 0 or number == 3 else 2.0
+        ahead = h if number == 2 else 0.5 * h
+        for i in range(n):
+            f[i] += bias[i]
+            total[i] += weight * f[i]
+            stage[i] = x[i] + ahead * f[i]
+    for i in range(n):
+        x[i] += h / 6.0 * total[i]
+        for b in range(L):
+            B[i, b] = fx[i, b] if b < n else 0.0
+        for b in range(len(column)):
+            if column[b] >= 0:
+                B[i, column[b]] += fp[i, b]
+        if bias_column[i] >= 0:
+            B[i, bias_column[i]] += 1.0
+        for b in range(L):
+            E[i, b] = B[i, b]
+    for order in range(SERIES_ORDER, 1, -1):
+        multiply(fx, E, S)
+        for i in range(n):
+            for b in range(L):
+                E[i, b] = B[i, b] + h / order * S[i, b]
+    for i in range(n):
+        for b in range(L):
+            S[i, b] = h * E[i, b]
+        S[i, i] += 1.0
+
+
+@compiled_part
+def spread_ahead(
+    P: Array, S: Array, fx: Array, intensity: Array, h: float, G: Array, half: Array
+) -> None:
+    """Overwrite the covariance `P` by that after a step, process noise added by Simpson's rule."""
+    n, L = S.shape
+    multiply(S, P, G)
+    for a in range(n):
+        for b in range(n, L):
+            P[a, b] = G[a, b]
+            P[b, a] = G[a, b]
+        for b in range(n):
+            P[a, b] = 0.0
+            for i in range(L):
+                P[a, b] += G[a, i] * S[b, i]
+    for i in range(n):
+        if intensity[i] == 0.0:
+            continue
+        # The transition over half of the step is a series too.
+        for a in range(n):
+            half[a] = 0.5 * h * fx[a, i]
+            for b in range(n):
+                half[a] += 0.125 * h * h * fx[a, b] * fx[b, i]
+        half[i] += 1.0
+        for a in range(n):
+            for b in range(n):
+                P[a, b] += h / 6.0 * intensity[i] * (S[a, i] * S[b, i] + 4.0 * half[a] * half[b])
+        P[i, i] += h / 6.0 * intensity[i]
+
+
+@compiled_part
+def take_measurements(
+    z: Array,
+    P: Array,
+    H: Array,
+    variance: Array,
+    seen: BoolArray,
+    e: Array,
+    white: Array,
+    power: Array,
+    change: Array,
+    PH: Array,
+) -> bool:
+    """Correct states and covariance by the outputs of an instant; return whether P was sound."""
+    L = len(z)
+    change[:] = 0.0
+    for j in range(len(e)):
+        white[j], power[j] = 0.0, 1.0
+        if not seen[j]:
+            e[j] = 0.0
+            continue
+        left, spread = e[j], variance[j]
+        for a in range(L):
+            PH[a] = 0.0
+            for b in range(L):
+                PH[a] += P[a, b] * H[j, b]
+            left -= H[j, a] * change[a]
+            spread += H[j, a] * PH[a]
+        if not spread > 0.0:
+            return False
+        white[j], power[j] = left, spread
+        for a in range(L):
+            change[a] += PH[a] * left / spread
+            for b in range(L):
+                P[a, b] -= PH[a] * PH[b] / spread
+    for a in range(L):
+        z[a] += change[a]
+    return True
+
+
+@compiled_part
+def take_unknowns(z: Array, column: IntArray, values: Array) -> None:
+    """Write the unknowns among the states into what they are values of."""
+    for j in range(len(column)):
+        if column[j] >= 0:
+            values[j] = z[column[j]]
 
 
 def filter_equations(
@@ -114,70 +268,45 @@ def filter_equations(
     """
     n, L, m, outputs, q = len(bias), len(z), inputs.shape[1], measured.shape[1], len(column)
     p, bias, offset, delay_s = p.copy(), bias.copy(), offset.copy(), delay_s.copy()
-    u, f, stage, sum_, back = np.zeros(m), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    u, back, work, half = np.zeros((3, m)), np.zeros(n), np.zeros((3, n)), np.zeros(n)
     fx, fu, fp = np.zeros((n, n)), np.zeros((n, m)), np.zeros((n, q))
     y, yx = np.zeros(outputs), np.zeros((outputs, n))
     yu, yp = np.zeros((outputs, m)), np.zeros((outputs, q))
-    S, T, K, sum_S = np.zeros((n, L)), np.zeros((n, L)), np.zeros((n, L)), np.zeros((n, L))
-    first, half, reached = np.zeros((n, n)), np.zeros((n, n)), np.zeros((outputs, L))
-    H, G, change, PH = np.zeros((outputs, L)), np.zeros((n, L)), np.zeros(L), np.zeros(L)
+    S, B, E, G = np.zeros((n, L)), np.zeros((n, L)), np.zeros((n, L)), np.zeros((n, L))
+    reached, H = np.zeros((outputs, L)), np.zeros((outputs, L))
+    change, PH = np.zeros(L), np.zeros(L)
     h = dt_s / substeps
     for k in range(len(inputs)):
         for i in range(n):
             if not abs(z[i]) < STATE_LIMIT:
                 return False
-        for j in range(q):
-            if column[j] >= 0:
-                p[j] = z[column[j]]
-        for j in range(outputs):
-            if offset_column[j] >= 0:
-                offset[j] = z[offset_column[j]]
-            if delay_column[j] >= 0:
-                delay_s[j] = z[delay_column[j]]
-        for i in range(n):
-            if bias_column[i] >= 0:
-                bias[i] = z[bias_column[i]]
+        take_unknowns(z, column, p)
+        take_unknowns(z, offset_column, offset)
+        take_unknowns(z, delay_column, delay_s)
+        take_unknowns(z, bias_column, bias)
         H[:, :] = 0.0
         for j in range(outputs):
             if leader[j] != j:
                 continue
-            S[:, :] = 0.0
+            late = delay_s[j]
             for i in range(n):
                 back[i] = z[i]
-                S[i, i] = 1.0
-            late = delay_s[j]
-            input_at(inputs, k - late / dt_s, ramp, u)
             if late != 0.0 or delay_column[j] >= 0:
                 # What is measured now was true `late` ago: one step back along the equations.
-                stage[:] = back
-                T[:, :] = S
-                sum_[:] = 0.0
-                sum_S[:, :] = 0.0
-                for number in range(4):
-                    share = 0.0 if number == 0 else (1.0 if number == 3 else 0.5)
-                    input_at(inputs, k - share * late / dt_s, ramp, u)
-                    rate_slopes(stage, u, p, c, t, f, fx, fu, fp)
-                    multiply(fx, T, K)
-                    for i in range(q):
-                        if column[i] >= 0:
-                            K[:, column[i]] += fp[:, i]
-                    for i in range(n):
-                        if bias_column[i] >= 0:
-                            K[i, bias_column[i]] += 1.0
-                    weight = 1.0 if number == 0 or number == 3 else 2.0
-                    ahead = -late if number == 2 else -0.5 * late
-                    for i in range(n):
-                        sum_[i] += weight * (f[i] + bias[i])
-                        stage[i] = back[i] + ahead * (f[i] + bias[i])
-                    sum_S += weight * K
-                    T[:, :] = S + ahead * K
-                for i in range(n):
-                    back[i] -= late / 6.0 * sum_[i]
-                S -= late / 6.0 * sum_S
+                for part in range(3):
+                    input_at(inputs, k - 0.5 * part * late / dt_s, ramp, u[part])
+                step_along(
+                    back, -late, u, p, c, t, bias, column, bias_column, work, fx, fu, fp, B, E, S
+                )
                 if delay_column[j] >= 0:
                     for i in range(n):
-                        S[i, delay_column[j]] -= f[i] + bias[i]
-            reading_slopes(back, u, p, c, t, y, yx, yu, yp)
+                        S[i, delay_column[j]] -= work[0, i]
+            else:
+                S[:, :] = 0.0
+                for i in range(n):
+                    S[i, i] = 1.0
+            input_at(inputs, k - late / dt_s, ramp, u[2])
+            reading_slopes(back, u[2], p, c, t, y, yx, yu, yp)
             multiply(yx, S, reached)
             for i in range(outputs):
                 if leader[i] != j:
@@ -190,87 +319,17 @@ def filter_equations(
                         H[i, column[b]] += yp[i, b]
                 if offset_column[i] >= 0:
                     H[i, offset_column[i]] += 1.0
-        change[:] = 0.0
-        for j in range(outputs):
-            white[k, j], power[k, j] = 0.0, 1.0
-            if not seen[k, j]:
-                e[k, j] = 0.0
-                continue
-            left, spread = e[k, j], variance[j]
-            for a in range(L):
-                PH[a] = 0.0
-                for b in range(L):
-                    PH[a] += P[a, b] * H[j, b]
-                left -= H[j, a] * change[a]
-                spread += H[j, a] * PH[a]
-            if not spread > 0.0:
-                return False
-            white[k, j], power[k, j] = left, spread
-            for a in range(L):
-                change[a] += PH[a] * left / spread
-                for b in range(L):
-                    P[a, b] -= PH[a] * PH[b] / spread
+        if not take_measurements(z, P, H, variance, seen[k], e[k], white[k], power[k], change, PH):
+            return False
         for a in range(L):
-            z[a] = min(max(z[a] + change[a], lower[a]), upper[a])
+            z[a] = min(max(z[a], lower[a]), upper[a])
         if k == len(inputs) - 1:
             break
-        for j in range(q):
-            if column[j] >= 0:
-                p[j] = z[column[j]]
-        for i in range(n):
-            if bias_column[i] >= 0:
-                bias[i] = z[bias_column[i]]
+        take_unknowns(z, column, p)
+        take_unknowns(z, bias_column, bias)
         for s in range(substeps):
-            S[:, :] = 0.0
-            for i in range(n):
-                stage[i] = z[i]
-                sum_[i] = 0.0
-                S[i, i] = 1.0
-            T[:, :] = S
-            sum_S[:, :] = 0.0
-            for number in range(4):
-                late = 0.0 if number == 0 else (1.0 if number == 3 else 0.5)
-                share = ramp * (s + late) / substeps
-                for j in range(m):
-                    u[j] = inputs[k, j] + share * (inputs[k + 1, j] - inputs[k, j])
-                rate_slopes(stage, u, p, c, t, f, fx, fu, fp)
-                if number == 0:
-                    first[:, :] = fx
-                multiply(fx, T, K)
-                for j in range(q):
-                    if column[j] >= 0:
-                        K[:, column[j]] += fp[:, j]
-                for i in range(n):
-                    if bias_column[i] >= 0:
-                        K[i, bias_column[i]] += 1.0
-                weight = 1.0 if number == 0 or number == 3 else 2.0
-                ahead = h if number == 2 else 0.5 * h
-                for i in range(n):
-                    sum_[i] += weight * (f[i] + bias[i])
-                    stage[i] = z[i] + ahead * (f[i] + bias[i])
-                sum_S += weight * K
-                T[:, :] = S + ahead * K
-            for i in range(n):
-                z[i] += h / 6.0 * sum_[i]
-            S += h / 6.0 * sum_S
-            # Only the states move: P becomes [S; 0 1] P [S; 0 1]'.
-            multiply(S, P, G)
-            for a in range(n):
-                for b in range(n, L):
-                    P[a, b] = G[a, b]
-                    P[b, a] = G[a, b]
-            # Noise of the step by Simpson's rule; the transition over its half is a series.
-            multiply(first, first, half)
-            for a in range(n):
-                for b in range(n):
-                    half[a, b] = 0.125 * h * h * half[a, b] + 0.5 * h * first[a, b]
-                half[a, a] += 1.0
-            for a in range(n):
-                for b in range(n):
-                    added = intensity[a] if a == b else 0.0
-                    for i in range(n):
-                        added += intensity[i] * (S[a, i] * S[b, i] + 4.0 * half[a, i] * half[b, i])
-                    P[a, b] = h / 6.0 * added
-                    for i in range(L):
-                        P[a, b] += G[a, i] * S[b, i]
+            for part in range(3):
+                input_within(inputs, k, (s + 0.5 * part) / substeps, ramp, u[part])
+            step_along(z, h, u, p, c, t, bias, column, bias_column, work, fx, fu, fp, B, E, S)
+            spread_ahead(P, S, fx, intensity, h, G, half)
     return True

@@ -3,7 +3,8 @@
 The filter is an extended Kalman filter whose gain follows the motion; nothing is linear about a
 mean. Its likelihood is exact for that filter (Jategaonkar, Flight Vehicle System Identification,
 2nd ed., ch. 5). Slopes of states and outputs within it are exact, those of its likelihood by the
-unknowns are central differences over a hundredth of a bound.
+unknowns are differences over a hundredth of a bound: of innovations, which bend so little that the
+optimum moves by less than a hundredth of a bound.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from host.sysid.numerics.nonlinear_problem import NonlinearProblem, finite
 
 STEP_BOUNDS = 0.01  # of a bound: differences
 LOG_STEP = 1e-3  # of a logarithm of a deviation
-MOST_FILTER_STEPS = 2  # from sample to sample: a filter corrects what a step misses
+# A filter corrects what a step misses: at most two from sample to sample, one of a quick record.
+MOST_FILTER_STEPS, QUICK_S = 2, 0.0125
 
 
 @dataclass(slots=True)
@@ -144,7 +146,7 @@ class EquationFilterProblem:
             active = self._active(number)
             by_white, by_power = (np.empty((white.size, len(active))) for _ in range(2))
             for k, unknown in enumerate(active):
-                dw, ds = self._difference(number, theta, int(unknown))
+                dw, ds = self._difference(number, theta, int(unknown), white, power)
                 by_white[:, k] = (dw / np.sqrt(power)).ravel()
                 by_power[:, k] = (ds / power).ravel()
             unit = (white / np.sqrt(power)).ravel()
@@ -164,21 +166,16 @@ class EquationFilterProblem:
         noise = np.arange(self.n_model, len(self.names))
         return np.concatenate([self.output_problem.columns(number), noise])
 
-    def _difference(self, number: int, theta: Array, unknown: int) -> tuple[Array, Array]:
-        step = self._steps[unknown]
-        ends = []
-        for sign in (1.0, -1.0):
+    def _difference(
+        self, number: int, theta: Array, unknown: int, white: Array, power: Array
+    ) -> tuple[Array, Array]:
+        for step in (self._steps[unknown], -self._steps[unknown]):
             moved = theta.copy()
-            moved[unknown] += sign * step
-            ends.append((sign, self._filtered(number, moved)))
-        good = [(sign, run) for sign, run in ends if run is not None]
-        if len(good) < 2:
-            here = self._filtered(number, theta)
-            good += [(0.0, here)] if here is not None else []
-        if len(good) < 2:
-            raise IdentificationError(f"model {self.model.name}: the filter has no finite slope")
-        (a, (_, w, s)), (b, (_, v, r)) = good
-        return (w - v) / ((a - b) * step), (s - r) / ((a - b) * step)
+            moved[unknown] += step
+            run = self._filtered(number, moved)
+            if run is not None:
+                return (run[1] - white) / step, (run[2] - power) / step
+        raise IdentificationError(f"model {self.model.name}: the filter has no finite slope")
 
     def _filtered(self, number: int, theta: Array) -> tuple[Array, Array, Array] | None:
         """Run the filter over a maneuver: innovations, independent ones, their variances."""
@@ -202,7 +199,11 @@ class EquationFilterProblem:
             np.full(len(g.parameters), -1, dtype=np.int64), problem.constants, problem.tables,
             g.bias, none[:n], problem.output_offsets(g.local), none[:outputs], delay_s,
             none[:outputs], self._leader, maneuver.dt_s,
-            min(problem.substeps, MOST_FILTER_STEPS), problem.ramp, e, white, power,
+            self._substeps(maneuver.dt_s), problem.ramp, e, white, power,
         ):  # fmt: skip
             return None
         return (e, white, power) if np.isfinite(e).all() and np.isfinite(white).all() else None
+
+    def _substeps(self, dt_s: float) -> int:
+        most = 1 if dt_s <= QUICK_S else MOST_FILTER_STEPS
+        return min(self.output_problem.substeps, most)
