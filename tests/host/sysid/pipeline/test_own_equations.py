@@ -68,6 +68,15 @@ def flown(model: Path) -> list[pd.DataFrame]:
     return tables
 
 
+def test_a_parameter_that_is_named_after_gusts_is_in_the_answer(tmp_path: Path) -> None:
+    """It was taken for one of the gust filter's and vanished."""
+    model = tmp_path / "mine.toml"
+    model.write_text(TEXT.replace("Zaa", "gust_aa"), encoding="utf-8")
+    [record, _] = flown(model)
+    answer = host.identify(record, models=model, methods="output-error-white", from_s=0.0, to_s=5.0)
+    assert "gust_aa" in answer.linear[0].result.names
+
+
 def test_two_records_give_the_truth_and_each_its_own_bias(tmp_path: Path) -> None:
     model = tmp_path / "mine.toml"
     model.write_text(TEXT, encoding="utf-8")

@@ -366,9 +366,11 @@ class LinearEstimator:
         self, estimate: LinearEstimate, intervals: LinearIntervals, validation: LinearValidation
     ) -> Answer:
         """Return the parts of all stages as one answer, judged."""
-        e, model = estimate, without_gust_penetration(estimate.model)
-        total = without_gust_parameters(intervals.total, model)
-        statistical = without_gust_parameters(intervals.statistical, model)
+        e, model = estimate, estimate.model
+        total, statistical = intervals.total, intervals.statistical
+        if e.method == GUST:  # a user may name a parameter of his gust_..., and keeps it
+            model = without_gust_penetration(model)
+            total, statistical = (without_gust_parameters(r, model) for r in (total, statistical))
         carrier = e.used[0].flight.compatibility
         return Answer(
             template=e.template,
