@@ -42,6 +42,7 @@ from host.sysid.estimators.gust_penetration import (
 from host.sysid.estimators.method_registry import fit, refuse_unless_finite
 from host.sysid.estimators.missing_control import missing_control, widened_by_missing_control
 from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
+from host.sysid.flight.column_noise import with_column_noise
 from host.sysid.flight.commanded_surfaces import brought_behind, servo_of
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.filter_step import (
@@ -298,6 +299,7 @@ class LinearEstimator:
                         coherence.innovation_variance,
                     ),
                 )
+        statistical = with_column_noise(statistical, e.maneuvers, e.trim)
         statistical = inflate_covariance(statistical, maneuver_agreement(statistical))
         statistical = inflate_by_coherence(statistical, coherence, excess)
         absent = missing_control(e.fit, at_trim, e.trim.airspeed_mps)

@@ -1,0 +1,64 @@
+"""Noise of measured columns that drive a user's equations: what output error leaves uncounted.
+
+Output error takes inputs for true. Rates and specific forces that drive a path carry noise, which
+the states add up: the zero of the gyro was held in 5 of 8 flights. Columns are drawn anew with
+noise as large as their own, and how far the estimate moves counts in its covariance. A filter's
+process noise stands for it already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from host.arrays import Array
+from host.sysid.flight.one_step import one_step_of
+from host.sysid.models.consider_covariance import consider_covariance
+from host.sysid.models.fit_result import FitResult
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.nonlinear_model import NonlinearModel
+from host.sysid.models.templates import Trim
+
+DRAWS, DRAW_SEED = 40, 3
+MEDIAN_TO_SIGMA = 1.4826  # of a normal distribution
+THIRD_DIFFERENCE_POWER = 20.0  # over that of white noise
+
+
+def with_column_noise(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim) -> FitResult:
+    """Return a result of output error with the noise of measured columns in its covariance.
+
+    Parameters
+    ----------
+    result : FitResult
+        Of other methods, and of models without columns, it comes back as it is.
+    maneuvers : sequence of Maneuver
+        That were fitted.
+    trim : Trim
+    """
+    model = result.model
+    if not isinstance(model, NonlinearModel) or result.residual_kind != "output":
+        return result
+    deviation = _noise_of(maneuvers)
+    deviation[: model.source.controls] = 0.0  # surfaces: `sampling_error`
+    found = one_step_of(result, maneuvers, trim) if np.any(deviation) else None
+    if found is None:
+        return result
+    rng = np.random.default_rng(DRAW_SEED)
+    moved = np.zeros((DRAWS, len(result.estimate)))
+    for row in moved:
+        drawn = [
+            replace(m, inputs=m.inputs + deviation * rng.standard_normal(m.inputs.shape))
+            for m in maneuvers
+        ]
+        row[:] = found.change(model, trim, drawn).sum(axis=0)
+    return replace(
+        result, covariance=result.covariance + consider_covariance(moved / np.sqrt(DRAWS))
+    )
+
+
+def _noise_of(maneuvers: Sequence[Maneuver]) -> Array:
+    """Return the deviation of white noise of every input; quick motion counts little."""
+    third = np.abs(np.vstack([np.diff(m.inputs, n=3, axis=0) for m in maneuvers]))
+    return np.asarray(MEDIAN_TO_SIGMA * np.median(third, axis=0) / np.sqrt(THIRD_DIFFERENCE_POWER))

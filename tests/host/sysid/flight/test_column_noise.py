@@ -1,0 +1,72 @@
+"""Noise of measured columns that drive equations is in the intervals of output error."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from host.sysid.estimators.method_registry import fit
+from host.sysid.flight.column_noise import with_column_noise
+from host.sysid.models.equation_file import equations_from
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.templates import Trim
+
+DT_S, SAMPLES, GYRO, ATTITUDE = 0.02, 200, 0.05, 0.002
+PITCH = equations_from(
+    {
+        "kind": "equations",
+        "inputs": ["elevator_rad"],
+        "columns": ["q_radps"],
+        "rates": {"theta_rad": "q_radps - q_bias_radps + 0*elevator_rad"},
+        "outputs": {"theta_rad": "theta_rad"},
+        "parameters": {"q_bias_radps": 0.0},
+    }
+)
+TRIM = Trim(17.0, 0.1, 0.1)
+
+
+@pytest.fixture(autouse=True)
+def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run the equations as Python: that takes no compiler's time."""
+    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
+
+
+def record(seed: int, gyro: float = GYRO) -> Maneuver:
+    """Return 4 s in which the attitude swings, of a gyro with noise."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(SAMPLES) * DT_S
+    q = 0.3 * np.cos(2.0 * t) + gyro * rng.standard_normal(SAMPLES)
+    theta = 0.15 * np.sin(2.0 * t) + ATTITUDE * rng.standard_normal(SAMPLES)
+    return Maneuver(DT_S, np.column_stack([np.zeros(SAMPLES), q]), theta[:, None])
+
+
+def test_the_zero_of_a_noisy_gyro_is_held() -> None:
+    """The attitude integrates the gyro's noise: without it 5 of 12 intervals held."""
+    bare, counted = [], []
+    for seed in range(12):
+        data = [record(seed)]
+        plain = fit("output-error-white", PITCH, data)
+        result = with_column_noise(plain, data, TRIM)
+        bare.append(abs(plain.estimate[0]) < plain.half_width()[0])
+        counted.append(abs(result.estimate[0]) < result.half_width()[0])
+    assert sum(bare) < 8 and sum(counted) >= 10
+
+
+def test_its_deviation_is_that_of_the_estimates() -> None:
+    found, told = [], []
+    for seed in range(12):
+        data = [record(seed)]
+        plain = fit("output-error-white", PITCH, data)
+        found.append(plain.estimate[0])
+        told.append(with_column_noise(plain, data, TRIM).standard_error[0])
+    assert 0.6 < np.median(told) / np.std(found) < 1.7
+
+
+def test_a_clean_column_a_surface_and_a_filter_add_nothing() -> None:
+    clean = [record(1, gyro=0.0)]
+    plain = fit("output-error-white", PITCH, clean)
+    moved = with_column_noise(plain, clean, TRIM).standard_error[0]
+    assert moved == pytest.approx(plain.standard_error[0], rel=0.05)
+    innovations = replace(plain, residual_kind="innovation")
+    assert with_column_noise(innovations, [record(1)], TRIM) is innovations
