@@ -1,7 +1,10 @@
 """The study of the shipped equations goes on where it stopped, and counts what holds."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import pandas as pd
 import pytest
 from studies import shipped_models
 
@@ -27,6 +30,15 @@ def test_a_run_goes_on_and_counts_each_cell(
 
 @pytest.mark.parametrize("name", shipped_models.MODELS)
 def test_constants_are_those_of_the_aircraft_and_the_flight(name: str) -> None:
-    constants = dict(shipped_models.shipped(name, 1.1).source.constants)
-    assert constants.get("density_kgpm3", 1.1) == 1.1
-    assert constants.get("mass_kg", 1.793) == pytest.approx(1.793)
+    flight: Any = SimpleNamespace(
+        table=pd.DataFrame({"t_s": [9.0], "density_kgpm3": [1.1], "rotor_radps": [800.0]}),
+        maneuvers=[{"axes": ["aileron"], "condition": {"alpha_rad": 0.12}}],
+        record=SimpleNamespace(card=SimpleNamespace(flight=SimpleNamespace(ground_s=1.0))),
+    )
+    constants = dict(shipped_models.shipped(name, flight).source.constants)
+    known = {
+        "density_kgpm3": 1.1, "mass_kg": 1.793, "spin_kgm2ps": 800.0 * 1.2991e-4,
+        "alpha_ref_rad": 0.12, "thrust_pitch_rad": -0.0523599, "thrust_arm_m": -0.01554,
+    }  # fmt: skip
+    for constant, value in known.items():
+        assert constants.get(constant, value) == pytest.approx(value, rel=1e-3), constant

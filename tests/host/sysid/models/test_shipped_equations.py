@@ -46,7 +46,8 @@ def test_every_file_is_read_and_its_code_is_small(name: str) -> None:
 def test_six_degrees_fly_as_the_longitudinal_model_in_the_plane() -> None:
     plane, space = shipped("longitudinal"), shipped("six_degrees")
     V, alpha, theta, q = 16.0, 0.08, 0.2, 0.3
-    wings = rates(plane, np.array([V, alpha, theta, q]), np.array([0.05, 3.0]))
+    x = np.array([V, alpha, theta, q, 0.0, 0.0])
+    wings = rates(plane, x, np.array([0.05, 3.0, 0.0, 0.0, 0.0]))
     x = np.array([V * np.cos(alpha), 0.0, V * np.sin(alpha), 0.0, q, 0.0, 0.0, theta])
     body = rates(space, x, np.array([0.05, 0.0, 0.0, 3.0]))
     u, w = x[0], x[2]
@@ -62,12 +63,35 @@ def test_six_degrees_roll_and_yaw_as_the_lateral_model_to_first_order() -> None:
     side, space = shipped("lateral"), shipped("six_degrees")
     V, alpha, theta, phi = 16.0, 0.08, 0.1, 0.02
     beta, p, r, da, dr = 1e-5, 2e-5, -1e-5, 1e-5, 3e-5
-    own = rates(side, np.array([beta, p, r, phi]), np.array([da, dr, V, alpha, theta]))
+    air = np.zeros(3)
+    own = rates(side, np.array([beta, p, r, phi, *air]), np.array([da, dr, V, alpha, theta, 0.0]))
     x = np.array([V * np.cos(alpha), V * beta, V * np.sin(alpha), p, 0.0, r, phi, theta])
     body = rates(space, x, np.array([0.0, da, dr, 3.0]))
     assert body["p_radps"] == pytest.approx(own["p_radps"], rel=1e-6)
     assert body["r_radps"] == pytest.approx(own["r_radps"], rel=1e-6)
     assert body["v_mps"] / V == pytest.approx(own["beta_rad"], rel=1e-6)
+
+
+def test_a_steady_gust_is_an_angle_of_attack_to_moments_and_none_to_gravity() -> None:
+    plane = shipped("longitudinal")
+    V, alpha, theta, w = 16.0, 0.08, 0.2, 0.4
+    u = np.array([0.05, 3.0, 0.0, 0.0, 0.0])
+    gusty = rates(plane, np.array([V, alpha, theta, 0.0, w, w]), u)
+    air = np.array([V * np.cos(alpha), V * np.sin(alpha) + w])
+    met = np.array([np.hypot(*air), np.arctan2(air[1], air[0]), theta, 0.0, 0.0, 0.0])
+    assert gusty["q_radps"] == pytest.approx(rates(plane, met, u)["q_radps"])
+    turning = rates(plane, np.array([V, alpha, theta, 0.0, w, 0.0]), u)
+    assert turning["q_radps"] > gusty["q_radps"]  # the air turns with it: less damping
+
+
+def test_a_rolling_gust_moves_the_aircraft_as_its_own_roll_does_the_other_way() -> None:
+    side = shipped("lateral")
+    u = np.array([0.0, 0.0, 16.0, 0.0, 0.0, 0.0])
+    still = rates(side, np.zeros(7), u)
+    air = rates(side, np.array([0, 0, 0, 0, 0, 0, 0.2]), u)
+    own = rates(side, np.array([0, 0.2, 0, 0, 0, 0, 0]), u)
+    for name in ("p_radps", "r_radps"):
+        assert air[name] - still[name] == pytest.approx(still[name] - own[name])
 
 
 def test_flight_path_of_an_aircraft_at_rest_in_a_turn_stands_still() -> None:

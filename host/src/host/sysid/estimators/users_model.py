@@ -29,8 +29,8 @@ from host.sysid.models.state_space_model import LinearModel
 GUST, FILTER = "filter-error-gust", "filter-error"
 MEMORY, WHITE = "output-error", "output-error-white"
 AT_LIMIT = 1e-9
-# Samples times unknowns of equations: 100 000 take half a minute by filter error.
-MOST_WORK = 300_000
+# Samples times unknowns times signals of another delay: 300 000 take five seconds by filter error.
+MOST_WORK = 400_000
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def fit_by_evidence(
         line = "noise chosen by the data: white, it has no memory"
         return UsersFit(WHITE, named, plain.maneuvers, remarks=(line,))
     why = no_filter(model, maneuvers)
-    work = sum(m.samples for m in maneuvers) * len(plain.result.estimate)
+    work = sum(m.samples for m in maneuvers) * len(plain.result.estimate) * (1 + len(model.delays))
     if not why and isinstance(model, NonlinearModel) and work > MOST_WORK:
         why = f"that would take many minutes; --method {FILTER} does it"
     if why:
