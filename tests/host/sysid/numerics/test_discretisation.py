@@ -1,10 +1,13 @@
 """Transition, response, delay and their slopes against scipy and finite differences."""
 
+import warnings
+
 import numpy as np
 import pytest
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import DelayGroup, LinearModel, Parameter, Term
 from host.sysid.numerics.ar_noise import ArNoise, ar_filter, autocovariance
+from host.sysid.numerics.filter_problem import discrete_noise
 from host.sysid.numerics.fractional_delay import delay_columns, slope_by_delay
 from host.sysid.numerics.output_error_problem import OutputProblem
 from scipy import signal
@@ -145,3 +148,11 @@ def test_a_diverging_response_is_reported_not_returned() -> None:
     problem = OutputProblem(model, [Maneuver(0.05, u, np.zeros((600, 3)))])
     theta = np.concatenate([[9.0, 60.0, 8.0, 0.0, -90.0, 0.0], np.zeros(4)])
     assert problem.respond(theta) is None
+
+
+def test_noise_of_a_model_that_diverges_within_a_sample_says_nothing() -> None:
+    """A search tries such models; a user saw two warnings of numpy on the terminal."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        _, Q = discrete_noise(np.diag([5e4, -5e4]), np.ones(2), 0.02)
+    assert not np.isfinite(Q).all()

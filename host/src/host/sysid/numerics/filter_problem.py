@@ -261,7 +261,8 @@ def discrete_noise(A: Array, intensity: Array, dt_s: float) -> tuple[Array, Arra
         van_loan(A, intensity), 2 * n, 0, False, dt_s, none, none, none, np.zeros(0), 0
     )
     F = np.ascontiguousarray(E[n:, n : 2 * n].T)
-    Qd = F @ E[:n, n : 2 * n]
+    with np.errstate(over="ignore", invalid="ignore"):  # of a model that diverges within a sample
+        Qd = F @ E[:n, n : 2 * n]
     return F, 0.5 * (Qd + Qd.T)
 
 
