@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from host.sysid.answer.json_document import answer_document
 from host.sysid.answer.marks import CAREFUL, TRUSTED
+from host.sysid.answer.servo_lines import servo_document
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, driven_by_inputs
 from host.sysid.answer.verdict import verdict_lines, verdict_of
+from host.sysid.estimators.servo_parameters import SERVO, ServoEstimate, ServoNumber
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import identify
@@ -217,3 +219,43 @@ def test_every_reason_is_in_the_words_and_in_the_document(right: Answer) -> None
     reason = marks["M_de"]["reasons"][-1]
     assert marks["M_de"]["mark"] == "do not rely on"
     assert any(line.endswith(reason) and "M_de" in line for line in lines)
+
+
+def commanded(answer: Answer, *, informed: bool, prior_half_width: float = 0.1) -> Answer:
+    """The same answer, its elevator only commanded."""
+    delay = ServoNumber(SERVO[0], -0.02, 0.06, prior_half_width, data_informed=informed)
+    rest = [ServoNumber(n, 5.0, 1.0, 1.0, data_informed=False) for n in SERVO[1:]]
+    names = answer.model.parameter_names
+    none = np.zeros((len(names), len(names)))
+    servo = ServoEstimate(("elevator_rad",), (delay, *rest), names, none, dict.fromkeys(names, 0.1))
+    return replace(answer, servo=servo)
+
+
+def test_what_commands_do_is_not_told_from_a_lag_that_nothing_tells(right: Answer) -> None:
+    """Thor's whole flight: a delay of -59 +- 72 ms, and no word about M_q."""
+    answer = commanded(right, informed=False)
+    pitch = {"M_alpha", "M_q", "M_de"}
+    assert relied_on(right) - relied_on(answer) == pitch
+    assert reason(answer, "M_q").startswith("the lag behind the commands is not known (the data")
+    said = verdict_of(answer).lines
+    [line] = [x for x in said if "the servos' lag and" in x]
+    assert "the servos' lag and M_alpha, M_q, M_de cannot be told apart" in line
+    document = servo_document(answer)
+    assert document is not None
+    assert document["not_told_apart"] == ["M_alpha", "M_q", "M_de"]
+    assert document["unknown_lag"] == "the data do not tell it"
+    for known in (
+        commanded(right, informed=True),
+        commanded(right, informed=False, prior_half_width=0.006),
+    ):
+        assert relied_on(known) == relied_on(right)
+
+
+def test_a_command_without_an_effect_tells_no_lag(right: Answer) -> None:
+    covariance = right.result.covariance.copy()
+    k = right.result.index("M_de")
+    covariance[k, k] = right.result.estimate[k] ** 2
+    vague = replace(right, result=replace(right.result, covariance=covariance))
+    answer = commanded(vague, informed=True)
+    assert "M_q" in relied_on(vague) - relied_on(answer)
+    assert "M_de cannot be told from zero" in reason(answer, "M_q")

@@ -14,7 +14,13 @@ from host.instrument.recording import Recording
 from host.instrument.servo_prior import ServoPrior, servo_prior
 from host.sysid.compatibility.servo_response import behind_servos
 from host.sysid.estimators.method_registry import fit
-from host.sysid.estimators.servo_parameters import ServoEstimate, considered_servo, estimate_servo
+from host.sysid.estimators.servo_parameters import (
+    ServoEstimate,
+    _Profile,
+    _rival,
+    considered_servo,
+    estimate_servo,
+)
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
@@ -178,3 +184,38 @@ def test_the_commands_of_a_real_flight_have_their_lag() -> None:
     k = answers[0].result.index("M_q")
     moved = answers[1].result.estimate[k] - answers[0].result.estimate[k]
     assert abs(moved) < 0.5 * answers[0].result.half_width()[k]
+
+
+def test_a_better_delay_far_away_is_named() -> None:
+    """Fits that are best at -0.08 s, hidden from a search from 0 by a hill between them."""
+    costs = {-0.08: 90.0, -0.04: 130.0, 0.0: 100.0, 0.04: 120.0}
+
+    def found(delay_s: float) -> float:
+        return float(np.interp(delay_s, list(costs), list(costs.values())))
+
+    profile = _Profile(template("roll", Trim(17.0)), lambda _: [], WIDE, lambda *_: None)  # type: ignore[arg-type]
+    for asked in costs:
+        profile.costs[asked] = found(asked)
+        profile.fits[asked] = None  # type: ignore[assignment]
+    assert profile.hollows == [-0.08, 0.0]
+    assert _rival(profile, 0.0, profile.hollows) == -0.08
+    assert _rival(profile, -0.08, profile.hollows) is None
+    assert _rival(profile, 0.0, [0.0]) is None
+
+
+def test_a_delay_that_cannot_be_is_not_known() -> None:
+    """Neither one that the data leave as it was, nor one ahead of its command, nor one of two."""
+    servo, _ = _found(0.0, WIDE)
+    delay = servo.numbers[0]
+    assert servo.unknown_delay == ""
+
+    def with_delay(**change: object) -> ServoEstimate:
+        return replace(servo, numbers=(replace(delay, **change), *servo.numbers[1:]))  # type: ignore[arg-type]
+
+    assert with_delay(data_informed=False).unknown_delay == "the data do not tell it"
+    ahead = with_delay(value=-0.04, half_width=0.01)
+    assert ahead.unknown_delay == "no surface is ahead of its command"
+    assert with_delay(value=-0.04, half_width=0.05).unknown_delay == ""
+    assert replace(servo, rival_s=0.16).unknown_delay == "160 ms fit better still"
+    known = with_delay(data_informed=False, prior_half_width=0.006)
+    assert known.unknown_delay == ""

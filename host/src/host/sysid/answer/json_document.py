@@ -118,7 +118,7 @@ def answer_document(
             name: {"value": value, "half_width": width}
             for name, (value, width) in answer.delays.items()
         },
-        "servo": servo_document(answer.servo),
+        "servo": servo_document(answer),
         "at_bound": list(answer.at_bound),
         "unpredicted": list(unpredicted_states(answer)),
         "corrections": correction_document(answer.corrections),

@@ -52,7 +52,7 @@ def linear_verdict(
     lines += _width_lines(answer, marks, shares, reasons)
     lines += _doubt_lines(answer, doubts)
     lines += _identifiability_lines(answer)
-    lines += [*_input_lines(answer), *servo_lines(answer.servo)]
+    lines += [*_input_lines(answer), *servo_lines(answer)]
     lines += combined_derivatives(answer, evidence.findings)
     lines += _data_lines(answer)
     return Verdict(heading, marks, tuple(lines), _all_reasons(answer, marks, shares, reasons))

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from host.sysid.answer.command_lag import lag_lookalikes, unknown_lag
 from host.sysid.estimators.servo_parameters import ServoEstimate
+from host.sysid.flight.linear_answer import Answer
 
 UNITS = {"servo_delay_s": "s", "servo_bandwidth_hz": "Hz", "servo_rate_limit_radps": "rad/s"}
 
 
-def servo_lines(servo: ServoEstimate | None) -> list[str]:
+def servo_lines(answer: Answer) -> list[str]:
     """Return the lines of the verdict on commanded surfaces; none without any."""
+    servo = answer.servo
     if servo is None:
         return []
     delay, bandwidth, rate = servo.numbers
@@ -20,9 +23,9 @@ def servo_lines(servo: ServoEstimate | None) -> list[str]:
         f" {bandwidth.value:.2g} +- {bandwidth.half_width:.2g} Hz and {rate.value:.2g}"
         f" +- {rate.half_width:.2g} rad/s (carried)"
     ]
-    if servo.alike:
+    if alike := lag_lookalikes(answer):
         lines.append(
-            f"  the servos' lag and {', '.join(servo.alike)} cannot be told apart: measure the"
+            f"  the servos' lag and {', '.join(alike)} cannot be told apart: measure the"
             " surface (a pot), or the servo on the ground"
         )
     return lines
@@ -37,8 +40,9 @@ def servo_estimate_lines(servo: ServoEstimate | None) -> list[str]:
     ]
 
 
-def servo_document(servo: ServoEstimate | None) -> dict[str, object] | None:
+def servo_document(answer: Answer) -> dict[str, object] | None:
     """Return the servos for JSON; None where every surface was measured."""
+    servo = answer.servo
     if servo is None:
         return None
     return {
@@ -53,5 +57,6 @@ def servo_document(servo: ServoEstimate | None) -> dict[str, object] | None:
             for n in servo.numbers
         },
         "correlation": servo.correlation,
-        "not_told_apart": list(servo.alike),
+        "unknown_lag": unknown_lag(answer),
+        "not_told_apart": list(lag_lookalikes(answer)),
     }

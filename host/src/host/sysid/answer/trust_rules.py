@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from host.sysid.answer.command_lag import lag_lookalikes, unknown_lag
 from host.sysid.answer.correlated_inputs import derivatives_of_both
 from host.sysid.answer.doubt import Doubt, doubt
 from host.sysid.answer.feedback_pairs import alike_derivatives, feedback_of
@@ -174,10 +175,17 @@ def input_feedback(answer: Answer, evidence: Evidence) -> list[Doubt]:
     ]
 
 
+def lag_unknown(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """A lag that nothing tells is under another name in what the commands do."""
+    why = unknown_lag(answer)
+    reason = f"the lag behind the commands is not known ({why}): they cannot be told apart"
+    return _named(answer, lag_lookalikes(answer), reason) if why else []
+
+
 Rule = Callable[[Answer, Evidence], list[Doubt]]
 RULES: tuple[Rule, ...] = (
-    open_finding, input_feedback, fit_fails, not_predicted, driven_by_inputs, delay_at_bound,
-    on_a_bound, impossible_sign, methods_disagree, one_input_for_two,
+    open_finding, input_feedback, lag_unknown, fit_fails, not_predicted, driven_by_inputs,
+    delay_at_bound, on_a_bound, impossible_sign, methods_disagree, one_input_for_two,
 )  # fmt: skip
 
 

@@ -36,6 +36,7 @@ SERVO = (DELAY, "servo_bandwidth_hz", "servo_rate_limit_radps")
 LEAST, MOST = (-0.15, 0.3, 0.2), (0.5, 60.0, 60.0)  # a delay, a bandwidth, a rate that can be
 WIDE_DELAY_S = 0.02  # one deviation: above it the search begins with delays far apart
 SCAN_S = np.arange(-0.08, 0.241, 0.04)
+RIVAL_S = 0.04  # from the best delay: another optimum, not its own slope
 FINE_S = 0.01  # between the delays about the best, at first
 STEP_SHRINKS = 5.0
 SHORT_STEPS, LEAST_STEP_S = 4.0, 3e-3  # deviations of the delay that the parabola may span
@@ -79,6 +80,8 @@ class ServoEstimate:
         What the uncertain servo adds to that of these.
     correlation : dict
         Of each parameter with the servo.
+    rival_s : float or None
+        A delay far from this one at which the method fits better: the search had another optimum.
     """
 
     surfaces: tuple[str, ...]
@@ -86,6 +89,7 @@ class ServoEstimate:
     names: tuple[str, ...]
     covariance: Array
     correlation: dict[str, float]
+    rival_s: float | None = None
 
     @property
     def setting(self) -> tuple[float, float, float]:
@@ -97,6 +101,25 @@ class ServoEstimate:
     def alike(self) -> tuple[str, ...]:
         """Parameters that cannot be told apart from the servo."""
         return tuple(n for n, r in self.correlation.items() if r > COLLINEAR)
+
+    @property
+    def wide_prior(self) -> bool:
+        """Whether next to nothing is known of the delay beforehand."""
+        return self.numbers[0].prior_half_width > NORMAL_95 * WIDE_DELAY_S
+
+    @property
+    def unknown_delay(self) -> str:
+        """Why the delay is not known, neither beforehand nor by the data; empty where it is."""
+        delay = self.numbers[0]
+        if not self.wide_prior:
+            return ""
+        if not delay.data_informed:
+            return "the data do not tell it"
+        if delay.value + delay.half_width < 0.0:
+            return "no surface is ahead of its command"
+        if self.rival_s is not None:
+            return f"{1e3 * self.rival_s:.0f} ms fit better still"
+        return ""
 
     def added_to(self, result: FitResult) -> FitResult:
         """Return a fit behind these servos with their uncertainty in its covariance."""
@@ -144,6 +167,13 @@ class _Profile:
             raise IdentificationError("no delay at which the fit comes about")
         return min(self.costs, key=self.costs.__getitem__)
 
+    @property
+    def hollows(self) -> list[float]:
+        """The delays asked that cost less than both beside them."""
+        at = sorted(self.costs)
+        costs = [np.inf, *(self.costs[d] for d in at), np.inf]
+        return [d for k, d in enumerate(at) if costs[k + 1] < min(costs[k], costs[k + 2])]
+
 
 def estimate_servo(
     model: LinearModel,
@@ -175,13 +205,14 @@ def estimate_servo(
     profile = _Profile(model, behind, prior, fit)
     wide = prior.sd[0] > WIDE_DELAY_S
     step = FINE_S if wide else prior.sd[0]
+    coarse = _Profile(model, behind, prior, quick)
     if wide:
-        coarse = _Profile(model, behind, prior, quick)
         coarse.ask(sorted(SCAN_S.tolist(), key=lambda d: abs(d - prior.mean[0])))  # outwards
         profile.ask([coarse.best])
     else:
         profile.ask([prior.mean[0]])
     delay, best, step, curvature = _least(profile, step)
+    rival_s = _rival(profile, best, coarse.hollows)
     at = profile.fits[best]
     sd = min(_colour(at) * float(curvature**-0.5), prior.sd[0])
     count = len(model.parameters)
@@ -191,7 +222,16 @@ def estimate_servo(
     shifts = [np.append(slope * sd, sd)]
     for k in (1, 2):
         shifts += _servo_shift(profile, best, k, count)
-    return _estimate(model, tuple(commanded), delay, prior, at, np.stack(shifts))
+    found = _estimate(model, tuple(commanded), delay, prior, at, np.stack(shifts))
+    return replace(found, rival_s=rival_s)
+
+
+def _rival(profile: _Profile, best: float, hollows: Sequence[float]) -> float | None:
+    """Return a delay that fits better than the best one near the start; None without any."""
+    asked = [d for d in hollows if abs(d - best) >= RIVAL_S]
+    profile.ask(asked)
+    better = [d for d in asked if profile.costs.get(d, np.inf) < profile.costs[best]]
+    return min(better, key=profile.costs.__getitem__) if better else None
 
 
 def _least(profile: _Profile, step: float) -> tuple[float, float, float, float]:
