@@ -121,17 +121,23 @@ def sensor_error_model(
     )
 
 
-def unknown_sensors(recording: Recording | None = None) -> SensorErrorModel:
+def unknown_sensors(
+    recording: Recording | None = None, calibration: Calibration | None = None
+) -> SensorErrorModel:
     """Return the sensors of an aircraft without a file: typical dynamics, places at the CG.
 
-    Sensors of a recording that is not our logger's have larger errors.
+    Sensors of a recording that is not our logger's have larger errors, unless a calibration says
+    otherwise.
     """
     nowhere = (0.0, 0.0, 0.0)
     recording = recording or Recording()
+    errors = usual_errors(recording.maker)
+    if calibration is not None:
+        errors = instrument_errors(None, calibration, maker=recording.maker)
     return SensorErrorModel(
         nowhere, nowhere, upwash=0.1, vane_hz_per_mps=1.0, vane_damping=0.1,
         vane_friction_rad=0.0, friction_speed_mps=1.0, pitot_lag_s=0.010,
-        errors=usual_errors(recording.maker), recording=recording,
+        errors=errors, recording=recording,
     )  # fmt: skip
 
 
@@ -227,6 +233,12 @@ def dynamic_pressure_share(errors: InstrumentErrors, qbar_pa: float) -> float:
     """Return one standard deviation of the pitots' dynamic pressure, as a share of it."""
     zero = errors["pitot_zero_pa"].of_mean() / qbar_pa
     return math.hypot(errors["pitot_scale"].of_mean(), zero)
+
+
+def airspeed_share(errors: InstrumentErrors, qbar_pa: float) -> float:
+    """Return one standard deviation of the airspeed's scale: pitots, and the density."""
+    pressure = dynamic_pressure_share(errors, qbar_pa)
+    return 0.5 * math.hypot(pressure, errors["density_share"].of_mean())
 
 
 def clock_share(instrument: SensorErrorModel) -> float:

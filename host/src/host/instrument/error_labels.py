@@ -12,7 +12,7 @@ ERROR_LABELS = {
     "mass_share": "mass", "ixx_share": "Ixx", "iyy_share": "Iyy", "izz_share": "Izz",
     "pitot_scale": "scale of the pitot", "pitot_zero_pa": "zero of the pitot",
     "pitot_drift_pa": "drift of the pitot", "pitot_delay_s": "delay of the pitot",
-    "density_share": "density", "upwash_share": "upwash",
+    "density_share": "density", "airspeed_share": "scale of the airspeed", "upwash_share": "upwash",
     "alpha_scale": "scale of the alpha vane", "alpha_zero_rad": "zero of the alpha vane",
     "beta_scale": "scale of the beta vane", "beta_zero_rad": "zero of the beta vane",
     "vane_delay_s": "delay of the vanes",

@@ -14,6 +14,8 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
+from host.instrument.deviations import airspeed_share
+from host.instrument.instrument_errors import usual_errors
 from host.instrument.recording import OWN
 from host.sysid.aerodynamics.coefficient_table import (
     Coefficient,
@@ -42,6 +44,7 @@ from host.sysid.estimators.gust_penetration import (
 from host.sysid.estimators.method_registry import fit, refuse_unless_finite
 from host.sysid.estimators.missing_control import missing_control, widened_by_missing_control
 from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
+from host.sysid.flight.airspeed_tolerance import airspeed_shift
 from host.sysid.flight.column_noise import with_column_noise
 from host.sysid.flight.commanded_surfaces import brought_behind, servo_of
 from host.sysid.flight.estimator import answer_of
@@ -316,6 +319,11 @@ class LinearEstimator:
             # delay with it: all outputs later are all inputs earlier.
             estimated = () if e.servo is None else (SERVO_DELAY, IMU_DELAY)
             shifts += tuple(s for s in moved if s.error not in estimated)
+        if self.airframe is None:
+            first = e.used[0].flight
+            usual = first.errors or usual_errors(first.maker)
+            share = airspeed_share(usual, e.condition.qbar_pa)
+            shifts += airspeed_shift(statistical, e.maneuvers, e.trim, share)
         # Of an instrument that is known surfaces are measured: they move between samples. Delays
         # that were estimated have taken up half a sample, and their intervals count it.
         if self.own is not None or not (e.delays or sensors_known(e.used)):

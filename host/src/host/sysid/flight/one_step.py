@@ -137,6 +137,14 @@ class OneStep:
         sensitivity = self._placed(consider_sensitivity.sum(axis=0).T)
         return Step(self._placed(step), added, covariance, sensitivity)
 
+    def widened_in(self, result: FitResult) -> float:
+        """Return by how much the intervals of a result are wider than white noise makes them: the
+        most of all, at least one."""
+        bare = np.zeros(self.length)
+        bare[self.target] = np.diag(self.inverse)[self.source]
+        known = (bare > 0.0) & (result.standard_error > 0.0)
+        return float(np.max(result.standard_error[known] / np.sqrt(bare[known]), initial=1.0))
+
     def _placed(self, unknowns: Array) -> Array:
         """Return rows of all unknowns as rows of the estimate."""
         result = np.zeros((len(unknowns), self.length))

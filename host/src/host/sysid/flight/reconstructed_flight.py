@@ -15,6 +15,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array, BoolArray
 from host.instrument.deviations import SensorErrorModel
+from host.instrument.instrument_errors import InstrumentErrors
 from host.instrument.recording import OWN
 from host.instrument.servo_prior import ServoPrior
 from host.near_names import like
@@ -65,6 +66,8 @@ class ReconstructedFlight:
         Those that no vane measured, reconstructed: for products with airspeed and rates only.
     maker : str
         Who recorded it, as `Recording.maker` says: our logger, an autopilot, or others.
+    errors : InstrumentErrors or None
+        Of its sensors, where a calibration says better than what is usual of the maker's.
     """
 
     source: str
@@ -80,6 +83,7 @@ class ReconstructedFlight:
     servo: ServoPrior | None = None
     angles: FlowAngles | None = None
     maker: str = OWN
+    errors: InstrumentErrors | None = None
 
 
 @dataclass(frozen=True, slots=True)

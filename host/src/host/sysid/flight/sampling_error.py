@@ -67,10 +67,7 @@ def _share(result: FitResult, found: OneStep, trim: Trim, maneuvers: Sequence[Ma
     """
     other = replace(result.model, hold=OTHER[result.model.hold])
     step = found.joint(result.model, trim, maneuvers, [other], [1.0])
-    bare = np.zeros(found.length)
-    bare[found.target] = np.diag(found.inverse)[found.source]
-    known = (bare > 0.0) & (result.standard_error > 0.0)
-    wider = np.max(result.standard_error[known] / np.sqrt(bare[known]), initial=1.0)
+    wider = found.widened_in(result)
     share, sd = float(step.added[0]), float(np.sqrt(step.covariance[0, 0]) * wider)
     if abs(share) > NORMAL_99 * sd:
         return float(min(np.hypot(share, NORMAL_95 * sd), 1.0))

@@ -68,7 +68,7 @@ def systematic_error_shifts(
     flights = {id(c): (c, cut) for c, cut in zip(reversed(known), reversed(cuts), strict=True)}
     sizes = {key: _open_deviations(*flight) for key, flight in flights.items()}
     errors = list(dict.fromkeys(e for c in known for e in sizes[id(c)]))
-    fresh = _is_template(result.model, trim)
+    fresh = is_template(result.model, trim)
     steps, gains = [], []
     for error in errors:
         other = [
@@ -86,7 +86,7 @@ def systematic_error_shifts(
             )
         )
         bent = _bent(trim, still[0], there[0]) if fresh and there[0] != still[0] else trim
-        model = result.model if bent is trim else _retrimmed(result.model, bent)
+        model = result.model if bent is trim else retrimmed(result.model, bent)
         steps.append(one_step.change(model, bent, changed).sum(axis=0))
     return tuple(
         ShiftedEstimate(error, result.estimate + step, *gain)
@@ -161,7 +161,7 @@ def _changed(
     )
 
 
-def _is_template(model: LinearModel, trim: Trim) -> bool:
+def is_template(model: LinearModel, trim: Trim) -> bool:
     """Return whether a model equals the template of its name at a trim."""
     if model.name not in TEMPLATES:
         return False
@@ -177,7 +177,8 @@ def _about(model: LinearModel, trim: Trim) -> LinearModel:
     return without_outputs(fresh, [y for y in fresh.outputs if y not in model.outputs])
 
 
-def _retrimmed(model: LinearModel, trim: Trim) -> LinearModel:
+def retrimmed(model: LinearModel, trim: Trim) -> LinearModel:
+    """Return a template's model about another trim."""
     fresh = _about(model, trim)
     own = without_gust_penetration(model)
     bent = replace(own, A=fresh.A, B=fresh.B, C=fresh.C, D=fresh.D, terms=fresh.terms)

@@ -13,6 +13,7 @@ import numpy as np
 from host.instrument.deviations import unknown_sensors
 from host.instrument.error_labels import recording_notes
 from host.instrument.servo_prior import servo_prior
+from host.physical.calibration import load_calibration
 from host.sysid.compatibility.flow_angles import reconstruct_flow_angles
 from host.sysid.compatibility.ground_attitude import update_by_standstill
 from host.sysid.compatibility.reconstruction import (
@@ -78,7 +79,8 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
     columns, travel = with_surface_angles(read.columns, read.shares, known)
     notes, findings = [*read.notes, *travel], [*read.findings]
     instrument = known.flown(read) if known else None
-    sensors = instrument or unknown_sensors(read.recording)
+    better = load_calibration(how.calibration) if how.calibration is not None else None
+    sensors = instrument or unknown_sensors(read.recording, better)
     commands = commands_of(columns, sensors)
     columns = surface_positions(columns, sensors)
     if instrument is not None or commands:
@@ -132,6 +134,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         commands=commands,
         servo=servo_prior(sensors) if commands and how.delays else None,
         angles=angles,
+        errors=sensors.errors,
     )
     return PreparedFlight(flight, agreement, tuple(notes))
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from host.aircraft.prior.prior_file import read_prior
 from host.aircraft.prior.prior_table import PriorTable
-from host.physical.calibration import load_calibration
 from host.progress import stage
 from host.sysid.answer.truth_comparison import read_truth
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, coefficient_estimator
@@ -146,9 +145,6 @@ def identify(
         prepare(source, how, by_calibration[how.calibration])
         for source, how in zip(sources, each, strict=True)
     ]
-    for made_by in calibrations:
-        if known is None and made_by is not None:
-            load_calibration(made_by)  # unused with a table, but a misspelt name is an error
     notes = collected_notes(ready, known.doubts if known else ())
     findings = collected_findings(ready)
     recorded = distinct_flights([one.flight for one in ready])
