@@ -1,7 +1,8 @@
 """Derivatives of one kind as those of the other, for `host convert`: read, converted, printed.
 
 What is read is a model that `host identify --save-model` wrote, a table of a person's own, or what
-AVL or Datcom say; what is known of the aircraft widens the intervals (`aircraft/conversion.py`).
+AVL or Datcom say; what is known of the aircraft widens the intervals
+(`aerodynamics/derivative_conversion.py`).
 """
 
 from __future__ import annotations
