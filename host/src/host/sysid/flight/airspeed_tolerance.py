@@ -52,4 +52,6 @@ def airspeed_shift(
     step = found.joint(result.model, trim, maneuvers, [retrimmed(result.model, faster)], [1.0])
     sd = float(np.sqrt(step.covariance[0, 0])) * found.widened_in(result)
     size = sd if sd < POSTERIOR_PRIOR_RATIO else 1.0
-    return (ShiftedEstimate(AIRSPEED, result.estimate + size * step.by_added[0], 1.0, 1.0),)
+    # What the fit left out stays out: no deviation of a sensor brings it back.
+    shift = np.where(np.diag(result.covariance) > 0.0, size * step.by_added[0], 0.0)
+    return (ShiftedEstimate(AIRSPEED, result.estimate + shift, 1.0, 1.0),)

@@ -15,7 +15,7 @@ from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
 from host.instrument.deviations import airspeed_share
-from host.instrument.instrument_errors import usual_errors
+from host.instrument.instrument_errors import InstrumentErrors, usual_errors
 from host.instrument.recording import OWN
 from host.sysid.aerodynamics.coefficient_table import (
     Coefficient,
@@ -525,6 +525,7 @@ def identify(
     compatibility: Compatibility | None = None,
     powerplant: Powerplant | None = None,
     maker: str = OWN,
+    errors: InstrumentErrors | None = None,
 ) -> list[Answer]:
     """Fit every model that has maneuvers to the columns of one flight.
 
@@ -552,6 +553,8 @@ def identify(
     maker : str
         Who recorded the columns, as `Recording.maker`: lateral motion of others' tables is fitted
         with rolling gusts by default, of ours only where an aircraft file is known.
+    errors : InstrumentErrors, optional
+        Of the sensors, without an aircraft file; otherwise what is usual of the maker's.
 
     Raises
     ------
@@ -567,7 +570,7 @@ def identify(
     flight = reconstruct_flight(
         columns, found, airframe=airframe, compatibility=compatibility, maker=maker
     )
-    flight = replace(flight, delays_open=flight.delays_open and with_delays)
+    flight = replace(flight, delays_open=flight.delays_open and with_delays, errors=errors)
     answers: list[Answer] = []
     failed: list[str] = []
     for name in names:
