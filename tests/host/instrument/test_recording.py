@@ -115,9 +115,12 @@ def test_servos_move_intervals_where_no_pot_measured(
     for answer in ("direct", "linear"):
         for name in ("Cm_de", "Cl_da", "Cn_dr"):
             assert scale[f"{name} {answer}"] == pytest.approx(share, rel=0.3), (name, answer)
-        # Of Cm_q, known to 30 % here, the smallest: 0.14.
-        assert min(late[f"{n} {answer}"] for n in ("Cm_q", "Cl_p")) > 0.1, answer
+        assert late[f"Cl_p {answer}"] > 0.15, answer
         assert slow[f"Cl_p {answer}"] > 0.2, answer
+    assert late["Cm_q linear"] > 0.15
+    assert (
+        late["Cm_q direct"] > 0.13
+    )  # known to 30 % here, 18 before the vanes' delay was the file's
 
 
 def test_a_zero_of_a_command_moves_neither_value_nor_interval(

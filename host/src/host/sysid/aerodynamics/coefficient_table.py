@@ -110,16 +110,16 @@ def coefficient_parts(
     thrust : PathThrust, optional
         Of the maneuvers, which is in the derivatives; none without.
     """
-    pull = thrust or PathThrust(0.0, 0.0)
+    path_thrust = thrust or PathThrust(0.0, 0.0)
 
     def in_proportion(derivatives: Array, a: AirframeData, at: Condition) -> Array:
         table = from_dimensional(dict(zip(result.names, derivatives.tolist(), strict=True)), a, at)
         return np.array([table[name] for name in names])
 
     def converted(
-        derivatives: Array, a: AirframeData, at: Condition, pull: PathThrust = pull
+        derivatives: Array, a: AirframeData, at: Condition, path_thrust: PathThrust = path_thrust
     ) -> Array:
-        by_thrust = pull.in_derivatives(a.mass_kg, at.airspeed_mps)
+        by_thrust = path_thrust.in_derivatives(a.mass_kg, at.airspeed_mps)
         of_thrust = np.array([by_thrust.get(name, 0.0) for name in result.names])
         return in_proportion(derivatives - of_thrust, a, at)
 
@@ -137,8 +137,8 @@ def coefficient_parts(
         cause: (converted(result.estimate, a, at) - value) / PERTURBATION * share
         for cause, (share, a, at) in _perturbed_mass_properties(airframe, condition).items()
     }
-    if pull.deviation_n > 0.0:
-        more = replace(pull, along_n=pull.along_n + pull.deviation_n)
+    if path_thrust.deviation_n > 0.0:
+        more = replace(path_thrust, along_n=path_thrust.along_n + path_thrust.deviation_n)
         assumed[THRUST] = converted(result.estimate, airframe, condition, more) - value
     if not any(SHARED.get(m.error) == QBAR for m in shifts):
         # Coefficients go with dynamic pressure inversely.

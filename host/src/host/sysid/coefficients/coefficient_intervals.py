@@ -43,12 +43,12 @@ from host.sysid.coefficients.trim_derivatives import (
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.numerics.maneuver_agreement import ManeuverAgreement, scatter_test
 
-# Of what instrumental variables moved, one deviation is left. A roll rate follows the aileron so
-# closely that they are weak: on fourteen flights of an independent simulator whose air rolls at 0.5
-# and 1 m/s Cl_p went from 0.08 to 0.24 of the truth by least squares to 0.65 to 0.99. In
-# light turbulence it moves by 7 %, of which nothing is left.
-INSTRUMENTS_SHARE = 0.25
-MUCH = 0.3  # of a coefficient: air pitches or rolls
+# One deviation of the error that instrumental variables leave, as a share of what they moved. A
+# roll rate follows the aileron so closely that they are weak: on fourteen flights of an independent
+# simulator whose air rolls at 0.5 and 1 m/s Cl_p went from 0.08 to 0.24 of the truth by least
+# squares to 0.65 to 0.99. In light turbulence they move it by 7 %.
+MOVED_SHARE = 0.25
+LEAST_MOVED = 0.3  # of a coefficient: below, air neither pitches nor rolls
 MOVED_BY_AIR = ("Cm_alpha", "Cm_q", "Cl_p", "Cl_da", "Cn_beta", "Cn_r")
 
 
@@ -69,9 +69,9 @@ class SearchResult:
         Standard deviations of the sensor errors before the flight.
     error_shifts : Array, shape (n, errors)
         Of all unknowns by one standard deviation of each sensor error.
-    moved_by_instruments : Array, shape (coefficients,)
-        What instrumental variables made of the estimate by least squares: nothing where air neither
-        pitches nor rolls.
+    moved_from_least_squares : Array, shape (coefficients,)
+        How far instrumental variables moved each estimate from that of least squares: next to
+        nothing where air neither pitches nor rolls.
     """
 
     problem: FlightProblem
@@ -81,7 +81,7 @@ class SearchResult:
     final: FinalStep
     error_deviations: Array
     error_shifts: Array
-    moved_by_instruments: Array
+    moved_from_least_squares: Array
 
     @cached_property
     def data(self) -> EquationData:
@@ -90,23 +90,23 @@ class SearchResult:
 
     @property
     def covariance(self) -> Array:
-        """Of all unknowns, (n, n); with a share of what the instruments moved, if that is much."""
+        """Of all unknowns, (n, n); a share of what instrumental variables moved much counts."""
         own = self.final.solution.covariance
         if not self.least_squares_shares:
             return own
         left = np.zeros(len(own))
-        left[: len(self.theta)] = INSTRUMENTS_SHARE * self.moved_by_instruments
+        left[: len(self.theta)] = MOVED_SHARE * self.moved_from_least_squares
         return own + consider_covariance(left[None])
 
     @property
     def least_squares_shares(self) -> dict[str, float]:
-        """Coefficients that instruments moved much: least squares over the estimate, by name."""
+        """Coefficients that instrumental variables moved much: least squares over the estimate."""
         shares = {
-            name: float(self.moved_by_instruments[k] / self.theta[k])
+            name: float(self.moved_from_least_squares[k] / self.theta[k])
             for name, k in self.problem.position.items()
             if name in MOVED_BY_AIR
         }
-        return {name: 1.0 - moved for name, moved in shares.items() if abs(moved) > MUCH}
+        return {name: 1.0 - moved for name, moved in shares.items() if abs(moved) > LEAST_MOVED}
 
 
 def derivatives_of(

@@ -170,7 +170,7 @@ def reconstruct(
         reason = "" if data_informed else _reason(name, gps=gps)
         if name == DELAYS[0] and instrument is not None:
             by_file = vane_delay_by_file(instrument, columns)
-            if _told_better((value, deviation), by_file):
+            if _known_better((value, deviation), by_file):
                 sd, data_informed, reason = by_file[1], False, BY_FILE
         findings.append(
             SensorErrorEstimate(
@@ -190,7 +190,7 @@ def reconstruct(
     return Compatibility(tuple(findings), rms, when, gps, instrument, tests, vanes)
 
 
-def _told_better(estimate: tuple[float, float], by_file: tuple[float, float]) -> bool:
+def _known_better(estimate: tuple[float, float], by_file: tuple[float, float]) -> bool:
     """Return whether a file knows an error better than a flight, and the flight does not object.
 
     Value and deviation of each. The gusts of two minutes pass for a part of the vanes' delay: the

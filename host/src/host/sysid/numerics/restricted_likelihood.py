@@ -39,13 +39,13 @@ def restricted_slopes(problem: FilterProblem, theta: Array, bounds: Array) -> Ar
         Cramer-Rao bounds; an unknown whose bound is zero has no slope.
     """
     model = problem.model
-    felt = {t.parameter for t in model.terms if t.matrix in "AC"}
-    felt |= {x.parameter for x in model.accelerometer_offsets}
-    felt |= set(problem.names[problem.n_model :])
+    in_filter = {t.parameter for t in model.terms if t.matrix in "AC"}
+    in_filter |= {x.parameter for x in model.accelerometer_offsets}
+    in_filter |= set(problem.names[problem.n_model :])
     here = half_log_determinants(problem, theta)
     slopes = np.zeros((len(here), len(theta)))
     for k, name in enumerate(problem.names):
-        if name in felt and bounds[k] > 0.0:
+        if name in in_filter and bounds[k] > 0.0:
             step, moved = STEP_BOUNDS * bounds[k], theta.copy()
             moved[k] += step if k < problem.n_model else min(step, LOG_STEP)
             slopes[:, k] = (half_log_determinants(problem, moved) - here) / (moved[k] - theta[k])
