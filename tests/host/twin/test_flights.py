@@ -11,8 +11,9 @@ import pytest
 from host.aircraft import handbook
 from host.aircraft.attitude import euler
 from host.aircraft.local_derivatives import local_derivatives
-from host.twin.flight.fly import NEUTRAL_US, THROW_US, fly
+from host.twin.flight.fly import fly
 from host.twin.flight.pilot import schedule
+from host.twin.flight.stick_commands import NEUTRAL_US, THROW_US
 from host.twin.outcome import original_logger
 from host.twin.outcome.truth_files import maneuvers, series, write
 from host.twin.sensors.local_flow import air_data

@@ -13,7 +13,7 @@ from host.aircraft.airframe import Array
 from host.constants import DEG_PER_RAD, GRAVITY_MPS2, RAD_PER_DEG
 from host.twin.faults import PITOTS, POTS, RECEIVER, VANES
 from host.twin.flight.draws import Draws, draw
-from host.twin.flight.fly import NEUTRAL_US, THROW_US
+from host.twin.flight.stick_commands import NEUTRAL_US, THROW_US
 from host.twin.ground.ground_walk import STEP_S, SURFACES, SWITCH_MEGA_US, GroundWalk
 from host.twin.sensors.analog import CHANNELS, DRIFT_TAU_S, NOISE_COUNT, nominal
 from host.twin.sensors.filters import first_order

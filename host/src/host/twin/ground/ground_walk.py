@@ -14,8 +14,8 @@ from host.aircraft.airframe import Array
 from host.aircraft.file import Aircraft
 from host.constants import DEG_PER_RAD
 from host.twin.faults import VANES
-from host.twin.flight.fly import IDLE_US, NEUTRAL_US, THROW_US
 from host.twin.flight.pilot import SWITCH_DIRECT_US
+from host.twin.flight.stick_commands import IDLE_US, NEUTRAL_US, THROW_US
 
 STEP_S = 0.05
 STOP_DEG = 60.0  # of the vane's housing, hw/mechanics/vane.toml limit_deg

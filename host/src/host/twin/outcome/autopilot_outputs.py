@@ -12,7 +12,8 @@ import numpy as np
 
 from host.aircraft.airframe import Array
 from host.errors import UsageError
-from host.twin.flight.fly import GAP_US, IDLE_US, NEUTRAL_US, THROW_US, FlightRecord
+from host.twin.flight.fly import FlightRecord
+from host.twin.flight.stick_commands import GAP_US, IDLE_US, NEUTRAL_US, THROW_US
 
 RECEIVER = ("aileron", "elevator", "rudder", "throttle")  # in the order of its pulses
 AIRFRAMES = ("conventional", "elevons", "vtail")

@@ -11,7 +11,8 @@ import pandas as pd
 
 from host.aircraft.airframe import AILERON, ELEVATOR, Q0, Q3, RUDDER, Array
 from host.aircraft.attitude import euler
-from host.twin.flight.fly import IDLE_US, NEUTRAL_US, THROW_US, FlightRecord
+from host.twin.flight.fly import FlightRecord
+from host.twin.flight.stick_commands import IDLE_US, NEUTRAL_US, THROW_US
 from host.twin.sensors.analog import CHANNELS, analog, convert, nominal
 from host.twin.sensors.imu import imu
 from host.twin.sensors.local_flow import AirData, air_data

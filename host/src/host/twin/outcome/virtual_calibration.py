@@ -19,7 +19,7 @@ from host.instrument.instrument_errors import (
     standard_errors,
 )
 from host.resources import resource
-from host.twin.flight.fly import IDLE_US, NEUTRAL_US, THROW_US
+from host.twin.flight.stick_commands import IDLE_US, NEUTRAL_US, THROW_US
 from host.twin.sensors.analog import CHANNELS
 from host.twin.testcard.cards import AXES
 

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from host.aircraft.airframe import Array
 from host.twin.faults import RECEIVER
-from host.twin.flight.fly import GAP_US, RC_PERIOD_S
+from host.twin.flight.fly import RC_PERIOD_S
+from host.twin.flight.stick_commands import GAP_US
 from host.twin.ground.ground_instrument import START_US, GroundFrames
 from host.twin.ground.ground_walk import GroundWalk
 from host.twin.recorder import sitl

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from host.errors import UsageError
 from host.twin.faults import Action, Fault, recorder_actions
-from host.twin.flight.fly import IDLE_US, NEUTRAL_US
+from host.twin.flight.stick_commands import IDLE_US, NEUTRAL_US
 from host.twin.recorder.fat32 import CARD_BYTES, CardImageError, CardReader, format_card
 from host.twin.recorder.flight_card_line import eeprom_with_card
 from host.twin.recorder.recorder_build import recorder_library

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from host.aircraft.airframe import Array
 from host.twin.faults import Fault
-from host.twin.flight.fly import GAP_US, RC_PERIOD_S, FlightRecord
+from host.twin.flight.fly import RC_PERIOD_S, FlightRecord
+from host.twin.flight.stick_commands import GAP_US
 from host.twin.sensors.mega_clock import Ticks, ticks
 
 EDGE = np.dtype([("at", np.int64), ("levels", np.uint8)])
