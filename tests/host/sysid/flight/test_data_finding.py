@@ -148,6 +148,12 @@ def test_small_inputs_are_fitted_as_one_stretch(record: pd.DataFrame) -> None:
     [finding] = [f for f in found.findings if f.check == "small-inputs"]
     assert "is fitted as one stretch" in finding.done
     assert finding.channels == ()
+    again = host.identify(
+        small, models="short-period", methods="equation-error", accept="small-inputs"
+    )
+    [accepted] = [f for f in again.findings if f.check == "small-inputs"]
+    assert accepted.accepted
+    assert accepted.done == f"accepted, {finding.done}"
     given = host.identify(small, models="short-period", from_s=float(record["t_s"][0]))
     large = host.identify(record, models="short-period", from_s=float(record["t_s"][0]))
     for name in ("M_alpha", "M_q", "M_de"):

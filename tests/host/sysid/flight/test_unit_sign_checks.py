@@ -167,6 +167,41 @@ def test_the_unit_that_agrees_with_all_others_is_read(case: str, flight: Columns
     assert all(columns[k] is wrong[k] for k in others)
 
 
+@pytest.mark.parametrize(("unit", "per_mps"), [("kt", 1.94384), ("ft/s", 3.28084)])
+def test_noise_of_a_vane_does_not_change_the_unit_read(
+    unit: str, per_mps: float, flights: dict[str, Columns]
+) -> None:
+    """Its slopes scatter; the middle of the range of factors said km/h for both."""
+    calm = {k: v for k, v in flights["calm"].items() if k not in ("qbar_pa", "density_kgpm3")}
+    rng = np.random.default_rng(17000)
+    noise = 0.015 * rng.standard_normal(len(calm["t_s"]))
+    noisy = {k: calm[k] + noise for k in ("alpha_rad", "beta_rad")}
+    _, findings = checked(times("airspeed_mps", per_mps)(calm | noisy))
+    assert f"read as airspeed_mps in {unit} " in lines(findings), lines(findings)
+
+
+def test_a_scale_that_no_unit_makes_is_named_as_such(flights: dict[str, Columns]) -> None:
+    calm = flights["calm"]
+    _, findings = checked(times("q_radps", 3.0)(calm))
+    [found] = [f for f in findings if f.check == "theta-against-q"]
+    scale = re.fullmatch(r"a scale of q_radps of ([\d.]+)", found.causes[0])
+    assert scale is not None, found.causes
+    assert float(scale[1]) == pytest.approx(3.0, rel=0.1)
+    assert found.wrong_unit
+    assert found.done == "used as it is"
+    [in_degrees] = [f for f in check(times("q_radps", DEG)(calm)) if f.check == "theta-against-q"]
+    assert in_degrees.causes[0].startswith("another unit of one of them")
+
+
+def test_no_reading_settles_a_finding_by_hiding_it(flights: dict[str, Columns]) -> None:
+    """All gyros times 3: a bank angle times 1000 left nothing that could be compared."""
+    rates = ("p_radps", "q_radps", "r_radps")
+    wrong = flights["calm"] | {k: 3.0 * flights["calm"][k] for k in rates}
+    columns, findings = checked(wrong)
+    assert all(columns[k] is wrong[k] for k in columns)
+    assert {"theta-against-q", "phi-against-p"} <= {f.check for f in findings if f.wrong_unit}
+
+
 def test_what_is_accepted_is_used_as_it_is_and_stays_open(flight: Columns) -> None:
     wrong = PROVEN["q turned round"][0](flight)
     accepted = {f.check for f in check(wrong)}

@@ -120,8 +120,9 @@ class Finding:
         return f"{where}finding {self.check}: {self.text}{causes}; {self.done}"
 
     def accept(self) -> Finding:
-        """Return the finding as the user accepted it."""
-        return replace(self, accepted=True, closed=False, done=f"accepted, {AS_IT_IS}")
+        """Return the finding as the user accepted it: where columns are in doubt they are used."""
+        done = AS_IT_IS if self.channels or self.feedback else self.done
+        return replace(self, accepted=True, closed=False, done=f"accepted, {done}")
 
 
 def open_channels(findings: Sequence[Finding]) -> dict[str, str]:

@@ -3,8 +3,9 @@
 How an angle turns follows from the rates, how the wind angles and the speed change from the rates
 and the specific force. Each column that moves one of them must do so with a factor of one. Noise
 on either side only widens the range of factors that a regression allows, from both directions;
-what lies outside as a whole is a unit, a sign or another clock. Of speed against forward force it
-may as well be thrust that a sensor does not feel, wind that changes with height, or a slow pitot.
+what lies outside as a whole is a unit, a scale, a sign or another clock. Of speed against forward
+force it may as well be thrust that a sensor does not feel, wind that changes with height, or a slow
+pitot. Gusts change the speed as no force says: an accelerometer alone in g may hide in them.
 """
 
 from __future__ import annotations
@@ -16,10 +17,12 @@ import numpy as np
 
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
+from host.sysid.flight.column_map import UNITS
 from host.sysid.flight.data_finding import HINT, Finding
 
 SIGN_CORRELATION, FACTOR_CORRELATION = 0.5, 0.25  # partial: less tells nothing of either
 LARGEST_FACTOR = 1.5
+UNIT_MARGIN = 1.1  # about the range of factors: a unit's outside it is none
 ANGLE_EXPLAINED = 0.3  # of an angle's rate that the gyro explains: less is another signal
 WIND_ANGLE_EXPLAINED = 0.05  # the same of a wind angle, which gusts turn too
 QUIET_RADPS = 0.02  # noise of a still sensor follows nothing
@@ -67,8 +70,11 @@ class Factor:
 
     @property
     def off(self) -> float:
-        """How far the middle of the range is from one, as a logarithm; infinite if turned round."""
-        return float(abs(np.log(self.low * self.high)) / 2.0) if self.low > 0.0 else np.inf
+        """How far the slope is from one, as a logarithm; infinite if turned round.
+
+        It is that of noise on the left: a difference of an angle has more of it than a mean rate.
+        """
+        return float(abs(np.log(self.low))) if self.low > 0.0 else np.inf
 
 
 def consistent(flown: Mapping[str, Array], dt_s: float) -> list[Finding]:
@@ -89,6 +95,11 @@ def consistent(flown: Mapping[str, Array], dt_s: float) -> list[Finding]:
 def misfit(flown: Mapping[str, Array], dt_s: float) -> float:
     """Return how far all factors are from one together: what tells units that look alike."""
     return float(sum(f.off for law in identities(flown, dt_s) for f in factors(law)))
+
+
+def related(flown: Mapping[str, Array], dt_s: float) -> set[tuple[str, str]]:
+    """Return what is seen to move with what: a column, and a part of its identity."""
+    return {(law.name, f.name) for law in identities(flown, dt_s) for f in factors(law)}
 
 
 def identities(flown: Mapping[str, Array], dt_s: float) -> Iterator[Identity]:
@@ -163,9 +174,24 @@ def _judge(f: Factor) -> Finding | None:
         check,
         channels,
         f"{f.law.name} moves {times:.3g} times as fast as {f.name} says",
-        SPEED_CAUSES if speed else (f"{UNIT}: {HINT}",),
+        SPEED_CAUSES if speed else _factor_causes(f),
         wrong_unit=not speed or not 1.0 / UNIT_OF_FORCE < times < UNIT_OF_FORCE,
     )
+
+
+def _factor_causes(f: Factor) -> tuple[str, ...]:
+    """Return a unit where one makes such a factor, else scales and the clock."""
+    ratios = {
+        ratio
+        for column in _channels(f.law.name, f.name)
+        for gain in UNITS.get(column.rsplit("_", 1)[-1], {}).values()
+        for ratio in (gain, 1.0 / gain)
+        if ratio != 1.0
+    }
+    if any(f.low / UNIT_MARGIN <= ratio <= f.high * UNIT_MARGIN for ratio in ratios):
+        return (f"{UNIT}: {HINT}",)
+    scales = (f"{f.name} of {1.0 / f.low:.2g}", f"{f.law.name} of {f.low:.2g}")
+    return (*(f"a scale of {scale}" for scale in scales), "another clock")
 
 
 def _channels(*names: str) -> tuple[str, ...]:

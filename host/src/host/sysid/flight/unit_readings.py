@@ -3,7 +3,8 @@
 A map that forgot a unit or a sign leaves a column that kinematics contradicts. Every unit that the
 column could come in is tried, twice converted too, the other sign, and angles or rates all in
 degrees; the reading that settles most findings is taken, and of several the one with factors
-nearest to one.
+nearest to one. A reading that agrees with nothing any more settles nothing: every relation that the
+columns had must still be seen.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from host.arrays import Array
 from host.constants import GRAVITY_MPS2, RAD_PER_DEG
 from host.sysid.flight.column_map import UNITS
 from host.sysid.flight.data_finding import Finding
-from host.sysid.flight.kinematic_checks import misfit
+from host.sysid.flight.kinematic_checks import misfit, related
 from host.sysid.flight.unit_sign_checks import SURFACES, airborne, check
 
 ANGLES = ("alpha_rad", "beta_rad", "phi_rad", "theta_rad", "psi_rad")
@@ -58,7 +59,7 @@ def reread(
         Those of `check` that ask for a reading.
     """
     proven = [f for f in findings if f.wrong_unit or f.check == "gravity"]
-    before = check(columns)
+    before, seen = check(columns), related(*airborne(columns))
     best: tuple[tuple[int, float], Reading, list[Finding]] | None = None
     for reading in _readings(columns, proven):
         trial = reading.read(columns)
@@ -67,6 +68,8 @@ def reread(
         if not settled & {(f.check, f.channels) for f in proven} or len(after) >= len(before):
             continue
         flown, dt_s = airborne(trial)
+        if seen - related(flown, dt_s):
+            continue
         score = len(after), misfit(flown, dt_s)
         if best is None or score < best[0]:
             best = score, reading, after

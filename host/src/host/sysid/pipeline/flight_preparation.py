@@ -106,9 +106,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         findings += [no_instrument_errors_finding(columns)] if read.shares else []
     reconstructed = agreement is not None and known is not None
     findings += no_vanes_finding(columns, reconstructed=reconstructed)
-    findings = [
-        f.accept() if f.check in how.accept and (f.channels or f.feedback) else f for f in findings
-    ]
+    findings = [f.accept() if f.check in how.accept and not f.accepted else f for f in findings]
     flight = reconstruct_flight(
         columns,
         found,
