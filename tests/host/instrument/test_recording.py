@@ -266,6 +266,24 @@ def test_a_table_of_ours_shows_what_was_commanded_and_who_checked_the_clock(
     assert recording_of_table(others, {}) == Recording(maker="foreign")
 
 
+def test_a_surface_worked_on_since_is_that_of_its_pots_or_of_its_command(
+    flown: VirtualFlight,
+) -> None:
+    columns = numbers(flown.table)
+    own = columns["elevator_pot_rad"]
+    smooth = 1.05 * np.convolve(np.pad(own, 2, mode="edge"), np.full(5, 0.2), mode="valid") + 0.02
+    command = columns["elevator_command_rad"]
+    pulses = {"servo_elevator_us": 1500.0 - 700.0 * command, "rc_elevator_us": 0.0 * command}
+    assert np.all(columns["mega_drives"] == 1.0)
+    logged = {k: v for k, v in columns.items() if not k.endswith("_command_rad")} | pulses
+    for table in (columns, logged):
+        assert recording_of_table(table | {"elevator_rad": smooth}, {}).commanded == ()
+        moved = table | {"elevator_rad": 1.05 * command + 0.02}
+        assert recording_of_table(moved, {}).commanded == ("elevator",)
+    unknown = {k: v for k, v in logged.items() if k not in pulses} | {"elevator_rad": smooth}
+    assert recording_of_table(unknown, {}).commanded == ("elevator",)
+
+
 def numbers(table: pd.DataFrame) -> dict[str, Array]:
     """Return a table's columns by name."""
     return {str(name): table[name].to_numpy(dtype=np.float64) for name in table}

@@ -1,8 +1,8 @@
 """How a source was recorded: which surfaces are commands, and who checked its clock.
 
 A log says so itself. A table that `host decode` wrote shows it: a surface is measured where its
-column is that of its pots, and the clock is checked where GPS spoke for long enough. Of a table of
-others nothing is known: its surfaces count as measured, unless its map calls them commands, and its
+column is that of its pots, or what somebody made of them since, which is more like them than like
+the command; and the clock is checked where GPS spoke for long enough. Of a table of others nothing is known: its surfaces count as measured, unless its map calls them commands, and its
 clock as right.
 """
 
@@ -59,15 +59,43 @@ def commanded_by_map(recording: Recording, lines: Mapping[str, Line]) -> Recordi
 
 
 def _measured(columns: Mapping[str, Array], surface: str) -> bool:
-    """Return whether a surface's column is what its pots said."""
+    """Return whether a surface's column is what its pots said, as it was or worked on since."""
+    pot, values = _pot(columns, surface), columns[f"{surface}_rad"]
+    if pot is None:
+        return False
+    seen = np.isfinite(values)
+    if np.sum((np.abs(values - pot) < SAME_ANGLE_RAD) & seen) >= MATCHING_SHARE * np.sum(seen):
+        return True
+    command = _command(columns, surface)
+    return command is not None and _unlike(values, pot) < _unlike(values, command)
+
+
+def _pot(columns: Mapping[str, Array], surface: str) -> Array | None:
+    """Return what the pots of a surface said, rad; None where one is missing."""
     if surface == "aileron":
         pots = [columns.get(f"aileron_{side}_rad") for side in ("left", "right")]
     else:
         pots = [columns.get(f"{surface}_pot_rad")]
     known = [pot for pot in pots if pot is not None]
     if len(known) < len(pots):
-        return False
-    pot = known[0] if len(known) == 1 else 0.5 * (known[0] - known[1])
-    near = np.abs(columns[f"{surface}_rad"] - pot) < SAME_ANGLE_RAD
-    seen = np.isfinite(columns[f"{surface}_rad"])
-    return bool(np.sum(near & seen) >= MATCHING_SHARE * np.sum(seen))
+        return None
+    return known[0] if len(known) == 1 else 0.5 * (known[0] - known[1])
+
+
+def _command(columns: Mapping[str, Array], surface: str) -> Array | None:
+    """Return the command of a surface, of a virtual flight rad, of a log its pulse, us."""
+    told, sent, received = f"{surface}_command_rad", f"servo_{surface}_us", f"rc_{surface}_us"
+    if told in columns:
+        return columns[told]
+    if sent not in columns or received not in columns:
+        return None
+    return np.where(columns[OWN_COLUMN] > 0.0, columns[sent], columns[received])
+
+
+def _unlike(values: Array, other: Array) -> float:
+    """Return the share of the motion of a column that no line through another explains."""
+    both = np.isfinite(values) & np.isfinite(other)
+    if np.sum(both) < MATCHING_SHARE * np.sum(np.isfinite(values)) or np.ptp(other[both]) == 0.0:
+        return np.inf
+    correlation = np.corrcoef(values[both], other[both])[0, 1]
+    return float(1.0 - correlation**2)
