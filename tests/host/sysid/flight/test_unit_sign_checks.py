@@ -12,6 +12,7 @@ from host.sysid.flight.data_finding import CHECKS, Finding, open_channels
 from host.sysid.flight.finding_consequences import checked
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.unit_sign_checks import SURFACES, check
+from studies.foreign.flight import Air, fly
 
 Columns = dict[str, np.ndarray]
 DEG = 180.0 / np.pi
@@ -29,6 +30,12 @@ def flights(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Columns]:
         found[card], notes = read_columns(folder / "flight.csv")
         assert notes == []
     return found
+
+
+@pytest.fixture(scope="module")
+def foreign() -> Columns:
+    """A flight of a simulator that is not ours, in calm air, with white noise of its sensors."""
+    return fly(Air(), 17022)[0]
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +101,15 @@ def test_a_flight_as_it_is_passes(flight: Columns) -> None:
     assert check({**{k: flight[k] for k in ("t_s", "airspeed_mps")}, **level}) == []
     slow = {k: v[::10] for k, v in flight.items()}  # 10 Hz
     assert check(slow) == []
+
+
+@pytest.mark.parametrize(("begin_s", "end_s"), [(4.0, 5.5), (4.0, 6.0), (14.0, 19.0), (43.0, 45.0)])
+def test_noise_of_a_short_record_is_no_finding(
+    begin_s: float, end_s: float, foreign: Columns
+) -> None:
+    """Its slopes are those of single samples: noise, which no rate explains."""
+    inside = (foreign["t_s"] >= begin_s) & (foreign["t_s"] < end_s)
+    assert check({k: v[inside] for k, v in foreign.items()}) == []
 
 
 def lines(findings: list[Finding]) -> str:

@@ -130,7 +130,9 @@ def _width_lines(
     if wide:
         lines.append(f"  do not rely on (above 30 %):  {', '.join(wide)}")
     if little := names_marked(marks, SMALL):
-        lines.append(f"  small (less than 5 % of their row, and known to be so):  {', '.join(little)}")
+        lines.append(
+            f"  small (less than 5 % of their row, and known to be so):  {', '.join(little)}"
+        )
     return lines
 
 

@@ -23,6 +23,7 @@ from host.sysid.flight.data_finding import HINT, Finding
 SIGN_CORRELATION, FACTOR_CORRELATION = 0.5, 0.25  # partial: less tells nothing of either
 LARGEST_FACTOR = 1.5
 UNIT_MARGIN = 1.1  # about the range of factors: a unit's outside it is none
+MOTION_SHARE = 0.3  # of what a law leaves: with less it is noise
 ANGLE_EXPLAINED = 0.3  # of an angle's rate that the gyro explains: less is another signal
 WIND_ANGLE_EXPLAINED = 0.05  # the same of a wind angle, which gusts turn too
 QUIET_RADPS = 0.02  # noise of a still sensor follows nothing
@@ -124,10 +125,12 @@ def _unrelated(law: Identity) -> Finding | None:
     """Return the finding of a column that does not follow its kinematic identity."""
     own = np.column_stack([np.ones(len(law.rate)), *law.beside])
     rate = _without(law.rate, own)
-    power = float(rate @ rate)
     left = _without(law.rate, np.column_stack([own, *law.parts.values()]))
+    noise = _difference_noise(left)
+    power, unexplained = float(rate @ rate) - noise, float(left @ left) - noise
     moved = min(float(np.std(law.rate)), max(float(np.std(v)) for v in law.parts.values()))
-    unexplained = float(left @ left)
+    if unexplained <= MOTION_SHARE * float(left @ left):
+        return None
     if moved <= QUIET_RADPS or power == 0.0 or unexplained <= (1.0 - law.explained_share) * power:
         return None
     names = list(law.parts)
@@ -135,9 +138,18 @@ def _unrelated(law: Identity) -> Finding | None:
         CHECK_OF[law.name, names[0]],
         _channels(law.name, *names),
         f"{law.name} does not follow {' and '.join(names)}"
-        f" ({100.0 * (1.0 - float(left @ left) / power):.0f} % of its motion)",
+        f" ({100.0 * (1.0 - unexplained / power):.0f} % of its motion)",
         ("another column", "another clock", "noise", f"a unit: {HINT}"),
     )
+
+
+def _difference_noise(rate: Array) -> float:
+    """Return how much of the power of a slope is noise of what it is the slope of.
+
+    White noise that is differenced turns back from step to step: its first autocovariance is minus
+    half of its power. Motion does not.
+    """
+    return max(-2.0 * float(rate[1:] @ rate[:-1]), 0.0)
 
 
 def factors(law: Identity) -> Iterator[Factor]:

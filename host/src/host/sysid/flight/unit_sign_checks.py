@@ -23,6 +23,7 @@ from host.sysid.flight.kinematic_checks import (
 
 BOUNDED = ("alpha_rad", "beta_rad", "theta_rad")
 DOUBTFUL_RAD = 1.0  # of such an angle in flight, and of a surface at any moment
+NUMERICAL_RAD = 1e-9  # that a simulation moves one by that nobody moved
 IDLE_RAD = 0.0035  # a surface that swings less between its ends excites nothing
 SIGN_DEVIATIONS = 10.0  # deviations
 WITHOUT_GRAVITY = 0.5  # of the size: with less along z, weight is not in it
@@ -103,7 +104,7 @@ def _surface_sizes(flown: Mapping[str, Array]) -> list[Finding]:
         size, swing = max(-float(low), float(high)), float(high - low)
         if size > DOUBTFUL_RAD:
             findings.append(_degrees("surface-size", name, size, sure=size > 0.5 * np.pi))
-        elif 0.0 < swing < IDLE_RAD:
+        elif NUMERICAL_RAD < swing < IDLE_RAD:
             text = f"{name} moves by {np.rad2deg(swing):.2g} deg in all"
             causes = ("a surface that was left alone", "radians that the map takes for degrees")
             findings.append(Finding("surface-idle", (name,), text, causes))
@@ -185,7 +186,7 @@ def _surfaces(means: Mapping[str, Array]) -> list[Finding]:
     findings = []
     for surface, (rate, beside, expected, wrong) in SURFACES.items():
         needed = (surface, rate, beside[0])  # without the wind angle its moment is the surface's
-        if any(name not in means for name in needed):
+        if any(name not in means for name in needed) or np.ptp(means[surface]) < IDLE_RAD:
             continue
         others = [means[k] for k in beside if k in means]
         left = np.gradient(means[rate], means["t_s"])
