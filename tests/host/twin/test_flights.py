@@ -16,6 +16,7 @@ from host.twin.flight.pilot import schedule
 from host.twin.flight.stick_commands import NEUTRAL_US, THROW_US
 from host.twin.outcome import original_logger
 from host.twin.outcome.truth_files import maneuvers, series, write
+from host.twin.sensors.analog import analog
 from host.twin.sensors.local_flow import air_data
 from host.twin.testcard import cards
 from host.twin.testcard.cards import duration_s
@@ -129,6 +130,19 @@ def test_a_pilot_who_breaks_off_lets_go_early_and_corrects_at_once() -> None:
         if w.kind in ("doublet", "3211"):
             assert w.input_end_s - w.start_s < 0.85 * (kept.input_end_s - kept.start_s)
             assert w.attention_s == w.input_end_s
+
+
+def test_the_same_inputs_are_flown_in_another_air() -> None:
+    card = cards.load("calm")
+    card = replace(card, air=replace(card.air, turbulence_mps=0.3))
+    first, same, other = (fly(card, seed=4, noise_seed=n) for n in (None, 4, 5))
+    assert np.array_equal(first.states, same.states)
+    assert np.array_equal(first.schedule.program, other.schedule.program)
+    assert first.draws.values["cg_m"].tolist() == other.draws.values["cg_m"].tolist()
+    assert first.air[:, 3:].std(axis=0) == pytest.approx(other.air[:, 3:].std(axis=0), rel=0.5)
+    assert abs(np.corrcoef(first.air[:, 5], other.air[:, 5])[0, 1]) < 0.3
+    seen, elsewhere = (analog(flown, air_data(flown)).counts for flown in (same, other))
+    assert not np.array_equal(seen, elsewhere)
 
 
 def test_three_multisines_reach_the_sticks_orthogonal_and_in_their_own_sizes() -> None:

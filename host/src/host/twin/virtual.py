@@ -50,6 +50,7 @@ def virtual_flight(
     chain: str = "sitl",
     errors: InstrumentErrors | None = None,
     instrument_seed: int | None = None,
+    noise_seed: int | None = None,
     aircraft: Aircraft | None = None,
 ) -> VirtualFlight:
     """Fly a card once.
@@ -62,8 +63,9 @@ def virtual_flight(
         ``sitl`` through the recorder, decoded with the calibration of the virtual instrument;
         ``gps`` the sensors without recorder, ``none`` the same without GPS; ``true`` the truth in
         the same columns; ``thesis`` its logger.
-    errors, instrument_seed, aircraft
-        Of the instrument, and what flies in place of the card's aircraft, as `fly` takes them.
+    errors, instrument_seed, noise_seed, aircraft
+        Of the instrument, of gusts and sensor noise, and what flies in place of the card's
+        aircraft, as `fly` takes them.
 
     Returns
     -------
@@ -85,8 +87,9 @@ def virtual_flight(
         raise ValueError(f"chain is {chain!r}, expected one of {', '.join(CHAINS)}")
     flown = card if isinstance(card, Card) else load(card)
     record = fly(
-        flown, seed=seed, errors=errors, instrument_seed=instrument_seed, aircraft=aircraft
-    )
+        flown, seed=seed, errors=errors, instrument_seed=instrument_seed, noise_seed=noise_seed,
+        aircraft=aircraft,
+    )  # fmt: skip
     data = air_data(record)
     if chain == "true":
         table = ideal.true_table(record, data)
@@ -102,7 +105,7 @@ def virtual_flight(
             rate_hz=sitl.recorder_rate_hz(record.card.flight.rate_hz),
             aircraft=record.aircraft.name,
             faults=record.card.faults,
-            seed=seed,
+            seed=record.seed,
         )
         if not recording.log:
             raise UsageError(f"nothing was recorded: {recording.name}")

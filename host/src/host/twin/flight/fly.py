@@ -46,6 +46,8 @@ class FlightRecord:
 
     Attributes
     ----------
+    seed : int
+        Of air and sensor noise.
     t_s : (n,) array
         True time since power-on.
     states : (n, 17) array
@@ -59,7 +61,7 @@ class FlightRecord:
         Widths the receiver puts out: aileron, elevator, rudder, throttle, switch.
     pulse_starts_s : (frames,) array
         Start of each receiver frame.
-    card, aircraft, seed, draws, frame, trim, schedule
+    card, aircraft, draws, frame, trim, schedule
         What was flown; `frame` is the aircraft as it really was.
     """
 
@@ -100,6 +102,7 @@ def fly(
     aircraft: Aircraft | None = None,
     errors: InstrumentErrors | None = None,
     instrument_seed: int | None = None,
+    noise_seed: int | None = None,
     added_us: Array | None = None,
 ) -> FlightRecord:
     """Fly a card.
@@ -117,6 +120,9 @@ def fly(
         What is drawn from; without, the standard errors with the aircraft's tolerances.
     instrument_seed : int, optional
         Fixes what is constant of an instrument; without, every flight has one of its own.
+    noise_seed : int, optional
+        Fixes gusts and the noise of the sensors: pilot's inputs, aircraft and instrument of `seed`
+        in another air. Without, `seed` does.
     added_us : (n, 3) array, optional
         What the logger adds to aileron, elevator and rudder at each step: it flies the inputs, of
         a card made by `flown_by_logger`. Of (0, 3): nothing yet.
@@ -134,8 +140,10 @@ def fly(
     if plane.straight is not None:
         _refuse_unfit(plane, card)
     # One stream per purpose, so that switching one thing off leaves the others as they were.
+    noise_seed = seed if noise_seed is None else noise_seed
     rng_draw, rng_pilot, rng_air, rng_radio = (
-        np.random.default_rng([seed, purpose]) for purpose in range(4)
+        np.random.default_rng([own, purpose])
+        for purpose, own in enumerate((seed, seed, noise_seed, seed))
     )
     draws = draw(
         plane,
@@ -194,7 +202,7 @@ def fly(
     return FlightRecord(
         card=card,
         aircraft=plane,
-        seed=seed,
+        seed=noise_seed,
         draws=draws,
         frame=frame,
         trim=trim,
