@@ -96,6 +96,16 @@ def test_bursts_over_edges_are_filled_by_what_the_aircraft_did(response: Aircraf
         assert max(curves[name], motion[name]) < share * line[name], name
 
 
+def test_a_column_stays_at_its_last_value(response: AircraftResponse) -> None:
+    """Airspeed needs a pressure that comes more slowly: a cubic went on to -255 m/s."""
+    rows = radio(flown(response)).assign(airspeed_mps=17.0 + np.sin(np.arange(400.0)))
+    last = len(rows) - 8
+    rows.loc[last + 1 :, "airspeed_mps"] = np.nan
+    drawn = finer(rows)
+    behind = drawn["airspeed_mps"][drawn["t_s"] > rows["t_s"][last] + STEP_S]
+    assert behind.to_numpy() == pytest.approx(rows["airspeed_mps"][last])
+
+
 def test_without_pulses_the_pots_tell(response: AircraftResponse) -> None:
     whole = flown(response)
     whole["rc_elevator_us"] *= np.nan

@@ -12,7 +12,7 @@ from host.constants import NORMAL_95
 from host.instrument.deviations import SensorErrorModel, deviations, sensor_error_model
 from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
-from host.sysid.coefficients.coefficient_search import fit_coefficients
+from host.sysid.coefficients.coefficient_search import fit_coefficients, search_coefficients
 from host.sysid.coefficients.window_spectra import Window, window_transform
 from host.sysid.compatibility.inverse_sensor_model import Record, apply_sensor_errors, usable_length
 from host.sysid.flight.even_grid import even_columns
@@ -45,16 +45,20 @@ def fitted(
     airframe: AirframeData | None = None,
     gains: Mapping[str, float] | None = None,
 ) -> CoefficientFit:
+    columns, windows = flown(flight)
+    kept = {k: v * (gains or {}).get(k, 1.0) for k, v in columns.items()}
+    frame = airframe or airframe_data(NAME)
+    return fit_coefficients(kept, windows, frame, data, powerplant(NAME))
+
+
+def flown(flight: VirtualFlight) -> tuple[dict[str, Array], list[Window]]:
     columns, _ = even_columns(flight.table)
-    columns = {k: v * (gains or {}).get(k, 1.0) for k, v in columns.items()}
     flying = columns["t_s"] > 8.0
     windows = [
         Window(float(str(m["start_s"])) - 0.5, float(str(m["end_s"])), m["axes"] == ["elevator"])
         for m in flight.maneuvers
     ]
-    kept = {k: v[flying] for k, v in columns.items()}
-    frame = airframe or airframe_data(NAME)
-    return fit_coefficients(kept, windows, frame, data, powerplant(NAME))
+    return {k: v[flying] for k, v in columns.items()}, windows
 
 
 def misses(flight: VirtualFlight, fit: CoefficientFit) -> dict[str, float]:
@@ -82,6 +86,20 @@ def test_finds_the_truth_and_covers_it(flight: VirtualFlight) -> None:
             assert abs(miss[d.name]) * abs(d.value) <= 1.2 * d.half_width, d.name
     flagged = {d.name for d in fit.derivatives if d.flagged} & set(PRINCIPAL)
     assert {"Cn_p"} <= flagged <= {"Cn_p", "CD_0"}
+
+
+def test_known_residuals_know_the_air_too(flight: VirtualFlight) -> None:
+    """Noise in the roll rate moves Cl_p as rolling air does: where the air is known, by no air."""
+    columns, windows = flown(flight)
+    noise = np.random.default_rng(3).normal(0.0, 1.0, len(columns["t_s"]))
+    noisy = {**columns, "p_radps": columns["p_radps"] + noise}
+    given = noisy, windows, airframe_data(NAME), sensor_error_model(NAME), powerplant(NAME)
+    alone = search_coefficients(*given)
+    known = search_coefficients(*given, known_noise=alone.final.noise)
+    assert "Cl_p" in alone.least_squares_shares
+    assert known.least_squares_shares == {}
+    k = alone.problem.position["Cl_p"]
+    assert known.covariance[k, k] < 0.5 * alone.covariance[k, k]
 
 
 def test_roll_under_the_elevator_tells_a_cg_beside_the_plane_of_symmetry() -> None:

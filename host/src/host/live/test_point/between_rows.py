@@ -97,7 +97,7 @@ def finer(table: pd.DataFrame) -> pd.DataFrame:
         if known.mean() > 0.5:  # of every row: not those of a slower sensor
             near = gaps[np.clip(np.searchsorted(own, at) - 1, 0, len(gaps) - 1)]
             curve = CubicSpline(own, series)(at)
-            even = near < GAP_FACTOR * np.median(gaps)
+            even = (near < GAP_FACTOR * np.median(gaps)) & (at <= own[-1])
             out[name] = np.where(even, curve, out[name])
     return pd.DataFrame(out)
 

@@ -7,6 +7,7 @@ answer comes in time its movement alone is judged.
 from __future__ import annotations
 
 import itertools
+import math
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -32,6 +33,7 @@ LOOKED_S = 0.5  # of the stream between two looks: a verdict is that late at mos
 EARLY_S, LATE_S = 1.5, 6.0  # of an input, against the countdown
 ANSWER_S = 1.0  # of the computer's clock: an estimate takes a fifth of it
 AHEAD_S = 10.0  # a recording played fast is held here until the answer is there
+MOST_BYTES = round(2600.0 * KEPT_S)  # of the radio, before a row has told the time
 _SHOWN = 8
 
 
@@ -107,6 +109,8 @@ class PointWatch:
     def take(self, data: bytes) -> None:
         """Take bytes of the stream, behind `hear`: an estimate is made of the last seconds."""
         now_s = self._recent.now_s
+        if self._bytes and math.isnan(self._bytes[-1][0]):  # the schema came later than its rows
+            data = (self._bytes.pop()[1] + data)[-MOST_BYTES:]
         self._bytes.append((now_s, data))
         while not 0.0 <= now_s - self._bytes[0][0] < KEPT_S and len(self._bytes) > 1:
             self._bytes.popleft()

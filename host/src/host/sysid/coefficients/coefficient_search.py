@@ -96,7 +96,8 @@ def search_coefficients(
     assumed : mapping, optional
         Standard deviations of errors that are larger than the instrument's.
     known_noise : ResidualSpectra, optional
-        Spectra of residuals that are known of other flights, in place of those of this one.
+        Spectra of residuals that are known of other flights, in place of those of this one. So is
+        their air: what instrumental variables move is then the rows' noise, and widens nothing.
 
     Returns
     -------
@@ -216,6 +217,8 @@ def _search(problem: FlightProblem, sd: Array, known_noise: ResidualSpectra) -> 
     prior_weight = np.divide(inverse_variance, 1.0 / sd, out=np.zeros_like(sd), where=sd > 0.0)
     shifts = -final.solution.inverse[:, final.unknowns.first_error :] * prior_weight
     moved = by_round[COEFFICIENT_ROUNDS - 1] - by_round[0]  # both without sensor errors
+    if known_noise:
+        moved = np.zeros_like(moved)
     return SearchResult(
         problem, iterate.theta, iterate.errors, iterate.level_slopes, final, sd, shifts, moved
     )
