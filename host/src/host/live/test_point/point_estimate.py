@@ -2,7 +2,7 @@
 
 The same call as for the log of the card, on the last rows received, drawn to the rate of the log.
 Twice: weighted by the residuals of these rows, which know this point's gusts and what was missed
-between two rows as well; and by those of the flights of the promise, which know neither.
+between two rows as well, and scatter; and by those of the flights of the promise, which do not.
 """
 
 from __future__ import annotations

@@ -1,11 +1,10 @@
 """The verdict of one test point: its measures in, a score and words for the pilot out.
 
 The score is the half-width that the card promises over the one that is to be expected of what was
-flown, 100 at best. Two estimates from the rows that the radio brought tell what to expect. One is
-weighted by its own residuals: it knows this point's noise, and that of 20 rows a second and of
-lines over losses too. The other takes the residuals of the promise. Their mean counts; where there
-is no estimate, the movement of the surfaces alone. Which flights fixed the constants:
-`studies/point_verdicts.md`.
+flown, 100 at best. The movement of the surfaces tells what to expect, and an estimate from the rows
+that the radio brought: weighted by the residuals of the promise, for those of one point scatter; in
+gusts, which the promise knows nothing of, by its own. Their mean counts; where there is no
+estimate, the movement alone. Which flights fixed the constants: `studies/point_verdicts.md`.
 """
 
 from __future__ import annotations
@@ -32,13 +31,14 @@ NOISE_SHARE = {
 }  # fmt: skip
 OTHER_SHARE = 0.3
 # Where the promise is known, so are its shares. It was flown by a pilot too, whose edges tell less
-# than the card's; gusts count from a little more than the card's on.
-PILOT = 1.1  # times the deviation of the card's input
+# than the card's (medians of faultless points); gusts count from a little more than the card's on.
+PILOT = {"elevator": 1.16, "aileron": 1.12, "rudder": 1.09}  # times the card's deviation
 LEAST_DEVIATION = 0.8
 CALM, GUSTS_POWER = 1.4, 0.9
-# Weight of the estimate by its own residuals in the logarithm, all rows there and some missing.
-WHOLE_SHARE, GAPS_SHARE = 0.65, 0.35
-RADIO_WIDER = 1.06  # than of the card's 100 rows: less is averaged
+# Weight of the estimate in the logarithm, the movement has the rest: in calm air by the residuals
+# of the promise, in gusts by its own, of which two flights of one point differ by a quarter.
+CALM_SHARE, GUSTS_SHARE = 0.6, 0.3
+LEAST_OF_MOVED = 0.5  # no rows tell so much more than their movement: such a fit ran away
 WEAK, LOUD = 0.7, 1.5  # of the wanted amplitude
 SHORT, LONG = 0.75, 1.35  # of the wanted length
 ROUND = 1.25  # times the card's deviation: what there is to say where nothing else is wrong
@@ -98,9 +98,9 @@ def judge_point(
     """
     estimate = estimate or PointEstimate()
     moved = moved_width(measures, wanted, estimate)
-    estimated = estimated_width(measures, wanted, estimate)
-    if moved >= UNDETERMINED_RATIO:
-        estimated = None
+    estimated = None
+    if moved < UNDETERMINED_RATIO:
+        estimated = estimated_width(measures, wanted, estimate, moved)
     width = moved if estimated is None else estimated
     score = round(min(100.0, 100.0 / width))
     said = _remarks(measures, wanted)
@@ -120,10 +120,10 @@ def moved_width(m: PointMeasures, wanted: Segment, estimate: PointEstimate) -> f
     shares = _noise_shares(wanted, estimate)
     factors = [(m.corrected, CORRECTED_MUCH), (m.airspeed_change, SPEED_CHANGE)]
     if estimate.promised:
-        noise = np.maximum(m.deviations / PILOT, LEAST_DEVIATION)
+        noise = np.maximum(m.deviations / _of_axes(PILOT, wanted), LEAST_DEVIATION)
         noise *= max(1.0, m.gusts / CALM) ** GUSTS_POWER
     else:
-        factors.append((m.gusts, _gusty(wanted)))
+        factors.append((m.gusts, _of_axes(GUSTY, wanted)))
         mean = np.exp(np.mean(np.log(np.maximum(m.deviations, 1.0))))
         noise = np.full(len(shares), mean)
     width = math.exp(0.5 * float(np.mean(np.log(1.0 + shares * (noise**2 - 1.0)))))
@@ -132,21 +132,28 @@ def moved_width(m: PointMeasures, wanted: Segment, estimate: PointEstimate) -> f
     return width
 
 
-def estimated_width(m: PointMeasures, wanted: Segment, estimate: PointEstimate) -> float | None:
-    """Return the half-width that the radio's rows gave over the promised one, geometric mean.
+def estimated_width(
+    m: PointMeasures, wanted: Segment, estimate: PointEstimate, moved: float
+) -> float | None:
+    """Return the half-width to expect by estimate and movement over the promised one.
 
-    None where there is no promise, or no estimate.
+    None where there is no promise, or no estimate to believe.
+
+    Parameters
+    ----------
+    m : PointMeasures
+    wanted : Segment
+    estimate : PointEstimate
+    moved : float
+        Of `moved_width`.
     """
-    measured = _mean_ratio(wanted, estimate.promised, estimate.measured)
-    expected = _mean_ratio(wanted, estimate.promised, estimate.expected)
-    if measured is not None and m.gusts > CALM:
-        expected = None  # the promise knows nothing of such air
-    share = GAPS_SHARE if m.lost > 0.0 else WHOLE_SHARE
-    known = [(r, s) for r, s in ((measured, share), (expected, 1.0 - share)) if r is not None]
-    if not known:
+    widths, share = estimate.expected, CALM_SHARE
+    if m.gusts > CALM:
+        widths, share = estimate.measured, GUSTS_SHARE
+    ratio = _mean_ratio(wanted, estimate.promised, widths)
+    if ratio is None or math.exp(ratio) < LEAST_OF_MOVED * moved:
         return None
-    total = sum(s for _, s in known)
-    return math.exp(sum(r * s for r, s in known) / total) / RADIO_WIDER
+    return math.exp(share * ratio + (1.0 - share) * math.log(moved))
 
 
 def _mean_ratio(
@@ -170,8 +177,9 @@ def _noise_shares(wanted: Segment, estimate: PointEstimate) -> Array:
     return np.full(len(names), max(usual))
 
 
-def _gusty(wanted: Segment) -> float:
-    return min(GUSTY.get(axis, GUSTY["elevator"]) for axis in wanted.axes)
+def _of_axes(limits: Mapping[str, float], wanted: Segment) -> float:
+    """Return the least of the point's axes."""
+    return min(limits.get(axis, limits["elevator"]) for axis in wanted.axes)
 
 
 def _remarks(m: PointMeasures, wanted: Segment) -> tuple[str, ...]:
@@ -196,7 +204,7 @@ def _remarks(m: PointMeasures, wanted: Segment) -> tuple[str, ...]:
         said.append(f"airspeed {100 * m.airspeed:+.0f} % off the card's")
     if m.airspeed_change > SPEED_CHANGE:
         said.append("airspeed not kept")
-    if m.gusts > _gusty(wanted):
+    if m.gusts > _of_axes(GUSTY, wanted):
         said.append(f"gusts {m.gusts:.1f} times the card's: wait for calm air")
     if m.lost > LOST:
         said.append(f"{100 * m.lost:.0f} % of it not received")
