@@ -19,6 +19,12 @@ def test_windows_of_linear_records_are_as_good_as_the_whole(case: windows.Case) 
     assert np.max(found.ratio) <= windows.LIMIT_WHOLE
 
 
+def test_a_fit_does_not_end_at_an_aircraft_that_diverges() -> None:
+    """Its equation error had M_q at +2.1, and the search converged there: 89 bounds off."""
+    row = windows.linear_row(windows.CASES[1], 6015)
+    assert np.max(np.abs(np.array(row["whole"])[:, 0])) < 5.0
+
+
 def test_a_run_goes_on_behind_what_is_done(tmp_path: Path) -> None:
     path, done = tmp_path / "rows.jsonl", []
 

@@ -1,9 +1,10 @@
 """Multistart: search from several starts where the first may have led to a local minimum.
 
 Differentiated noise biases equation error where noise is large and motion fast. If the first search
-does not converge, leaves more than the sensors' own noise or ends where the information is nearly
-singular, further searches start from `homotopy_start`. If those do not help, more start from
-equation error on signals behind a state variable filter, then with simulated instruments.
+does not converge, leaves more than the sensors' own noise or than no model would, or ends where the
+information is nearly singular, further searches start from `homotopy_start`. If those do not help,
+more start from equation error on signals behind a state variable filter, then with simulated
+instruments.
 """
 
 from __future__ import annotations
@@ -56,7 +57,8 @@ def multistart(
         Try other starts if the optimum leaves more than white noise or its information is nearly
         singular (default). In a flight gusts leave more than noise at every optimum.
     restarts : bool
-        Try other starts if the search does not converge (default); otherwise its end stands.
+        Try other starts if the search does not converge or its end explains nothing (default);
+        otherwise its end stands.
 
     Raises
     ------
@@ -68,7 +70,8 @@ def multistart(
     if not restarts:
         return minimise(problem, theta)
     best, failure = _try(problem, None, theta)
-    if best is not None and best.converged and not multiple_starts:
+    found = best is not None and best.converged and _explains_motion(problem, best)
+    if best is not None and found and not multiple_starts:
         return best
     accepted = best is not None and best.converged and _residuals_are_noise(problem, best)
     if best is not None and accepted and not _nearly_singular(best):
@@ -131,6 +134,24 @@ def _residuals_are_noise(problem: OutputProblem, optimum: Optimum) -> bool:
     noise = noise_deviation(problem.maneuvers) ** 2
     power = np.mean(np.hstack(optimum.residuals) ** 2, axis=1)
     return bool(np.all(power <= EXCESS_POWER * noise))
+
+
+def _explains_motion(problem: OutputProblem, optimum: Optimum) -> bool:
+    """Return whether an optimum leaves less than a constant for each output and maneuver does.
+
+    Equation error of short noisy inputs may start at an aircraft that diverges: its growing motion
+    has so much information that a search ends where it began.
+    """
+    left, moved = np.zeros((2, len(problem.counts)))
+    for number, residual in enumerate(optimum.residuals):
+        for j, y in enumerate(problem.measured(number)):
+            seen = problem.seen(number, j)
+            measured = y if seen is None else y[seen]
+            left[j] += float(np.sum(residual[j] ** 2))
+            moved[j] += float(np.sum((measured - np.mean(measured)) ** 2))
+    # An output that stands still, or is met without error, has no power.
+    shares = np.maximum(left, 1e-300) / np.maximum(moved, 1e-300)
+    return float(np.sum(problem.counts * np.log(shares))) < 0.0
 
 
 def _starts(problem: OutputProblem, theta: Array, accepted: Optimum | None) -> list[Array]:
