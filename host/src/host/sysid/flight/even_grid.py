@@ -1,4 +1,6 @@
-"""Columns of a flight on one even grid: rows in order, angles unwrapped, lines over gaps."""
+"""Columns of a flight on one even grid: rows in order, angles unwrapped, curves between slow
+samples, lines over gaps.
+"""
 
 from __future__ import annotations
 
@@ -165,7 +167,9 @@ def _grid(rows: _Instants, dt_s: float, notes: list[str]) -> Array:
 
 
 def even_grid(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
-    """Bring the table to an even grid, unwrap angles once, draw lines over gaps."""
+    """Bring the table to an even grid, unwrap angles once, draw curves between slow samples and
+    lines over gaps.
+    """
     index = rows_in_order(columns["t_s"], notes)
     if not np.array_equal(index, np.arange(len(columns["t_s"]))):
         columns = {name: values[index] for name, values in columns.items()}
@@ -193,7 +197,7 @@ def even_grid(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
         if name in ANGLES:
             series = _unwrapped(name, series, notes)
         result[name] = np.interp(grid, own.t, series)
-        if dt_s * 1e6 > SLOW_US and name in FITTED and own.step_s <= 1.5 * dt_s:
+        if own.step_s * 1e6 > SLOW_US and name in FITTED:
             result[name] += _bent(grid, own, series)
         if steps.get(name, 0.0) > 1.5 * dt_s:
             result[sampled_name(name)] = _at_instants(grid, own.t)
@@ -205,7 +209,7 @@ def even_grid(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
     if slower:
         notes.append(
             f"slower than the {dt_s:.3g} s of others, drawn between: {', '.join(slower)}; output"
-            " error compares at their own instants, all else takes the lines for measurements"
+            " error compares at their own instants, all else takes what is drawn for measurements"
         )
     if missing:
         length_s, at_s, _ = max(missing)
