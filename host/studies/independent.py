@@ -13,7 +13,7 @@ import functools
 import itertools
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -101,7 +101,14 @@ def with_instrument(
     air: Air, seed: int, axis: str, analysis: str
 ) -> Iterator[tuple[str, float, float, float]]:
     """Return the same of coefficients, all errors of the instrument drawn."""
-    answer = answer_with_file(air, seed)
+    model = DIRECT if analysis == DIRECT else axis
+    return of_coefficients(answer_with_file(air, seed, model), axis, analysis)
+
+
+def of_coefficients(
+    answer: host.Identification, axis: str, analysis: str
+) -> Iterator[tuple[str, float, float, float]]:
+    """Return name, truth, value and half-width of the coefficients of an answer."""
     direct = answer.coefficients
     known: dict[str, tuple[float, float]] = {}
     if analysis != DIRECT:
@@ -117,17 +124,28 @@ def with_instrument(
 
 
 @functools.lru_cache(maxsize=len(cells()))
-def answer_with_file(air: Air, seed: int) -> host.Identification:
-    """Return the linear answers and that of ``coefficients`` of one flight."""
+def answer_with_file(air: Air, seed: int, model: str) -> host.Identification:
+    """Return the answer of one model to one flight; kept for both axes of ``coefficients``."""
+    return identified(flown(air, seed), air, seed, (model,))
+
+
+def identified(
+    measured: Columns,
+    air: Air,
+    seed: int,
+    models: Sequence[str],
+    spoil: Callable[[Columns], Columns] = dict,
+) -> host.Identification:
+    """Return the answers to columns with drawn errors of the instrument, then spoilt."""
     number = list(cells().values()).index(air)  # each cell has an instrument of its own
     rng = np.random.default_rng([DRAW, seed, number])
-    table = pd.DataFrame(with_sensor_errors(flown(air, seed), rng))
+    table = spoil(with_sensor_errors(measured, rng))
     with tempfile.TemporaryDirectory() as folder:
         return host.identify(
-            table,
+            pd.DataFrame(table),
             aircraft=drawn_file(Path(folder), rng),
             calibration=SENSORS_FILE,
-            models=(*NAMES, DIRECT),
+            models=models,
         )
 
 
