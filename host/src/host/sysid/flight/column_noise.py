@@ -40,7 +40,7 @@ def with_column_noise(result: FitResult, maneuvers: Sequence[Maneuver], trim: Tr
     model = result.model
     if not isinstance(model, NonlinearModel) or result.residual_kind != "output":
         return result
-    deviation = _noise_of(maneuvers)
+    deviation = white_deviation([m.inputs for m in maneuvers])
     deviation[: model.source.controls] = 0.0  # surfaces: `sampling_error`
     found = one_step_of(result, maneuvers, trim) if np.any(deviation) else None
     if found is None:
@@ -58,7 +58,12 @@ def with_column_noise(result: FitResult, maneuvers: Sequence[Maneuver], trim: Tr
     )
 
 
-def _noise_of(maneuvers: Sequence[Maneuver]) -> Array:
-    """Return the deviation of white noise of every input; quick motion counts little."""
-    third = np.abs(np.vstack([np.diff(m.inputs, n=3, axis=0) for m in maneuvers]))
+def white_deviation(records: Sequence[Array]) -> Array:
+    """Return the deviation of white noise of every column; quick motion counts little.
+
+    Parameters
+    ----------
+    records : sequence of Array, each (samples, k) or (samples,)
+    """
+    third = np.abs(np.concatenate([np.diff(columns, n=3, axis=0) for columns in records]))
     return np.asarray(MEDIAN_TO_SIGMA * np.median(third, axis=0) / np.sqrt(THIRD_DIFFERENCE_POWER))

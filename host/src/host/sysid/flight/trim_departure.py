@@ -11,6 +11,9 @@ airspeed makes the angle of attack follow the pitch rate by 2 % more. What is le
 then held to be a gust, and where the tail feels gusts M_alpha is 2.7 % off by that. Whether air
 turns so, and by how much, no maneuver tells: intervals count it.
 
+The airspeed is measured, and its noise is in every departure: drawn anew it moves the estimate by
+as much as it has moved it already, and that counts in the covariance.
+
 The drag polar is a parabola in lift; its curvature is estimated along. Filter error with the gust
 is fitted to what output error says is left without departures, and corrected by what that left.
 """
@@ -29,7 +32,9 @@ from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
 from host.sysid.aerodynamics.path_thrust import rotor_means
 from host.sysid.aerodynamics.varying_airspeed import MEASURED, SECOND_ORDER_TERMS, VaryingModel
 from host.sysid.estimators.gust_model import gust_deviation_mps
+from host.sysid.flight.column_noise import white_deviation
 from host.sysid.flight.one_step import one_step_of
+from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
@@ -49,6 +54,7 @@ TURNING_SHARE = 0.8
 # Of D_alpha_alpha over V Z_alpha, which is 2 C_D_CL2 C_L_alpha of a parabolic polar: 0.3 to 1.
 LARGEST_CURVATURE = 3.0
 NO_SPIN = (0.0, 0.0)
+DRAWS = 4  # of the noise of the airspeed, each anew in every maneuver
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +66,8 @@ class Departure:
     shares : Array, shape (maneuvers, P)
         By how much each maneuver moves the joint estimate.
     remainders : tuple of ShiftedEstimate
+    airspeed_noise : Array, shape (P, P)
+        What the noise of the measured airspeed adds to the covariance.
     varying : VaryingModel
         What makes further inputs of the departures.
     model : LinearModel
@@ -70,6 +78,7 @@ class Departure:
 
     shares: Array
     remainders: tuple[ShiftedEstimate, ...]
+    airspeed_noise: Array
     varying: VaryingModel
     model: LinearModel
     maneuvers: tuple[Maneuver, ...]
@@ -88,7 +97,12 @@ class Departure:
         if isinstance(influence := details.get("maneuver_influence"), np.ndarray):
             tested = np.any(influence != 0.0, axis=0)  # what need not agree stays out of the test
             details["maneuver_influence"] = influence + tested * self.shares
-        return replace(result, estimate=result.estimate + self.step, details=details)
+        return replace(
+            result,
+            estimate=result.estimate + self.step,
+            covariance=result.covariance + self.airspeed_noise,
+            details=details,
+        )
 
     def removed_from(self, maneuvers: Sequence[Maneuver], estimate: Array) -> list[Maneuver]:
         """Return the maneuvers as if nothing had departed; as they are if the model diverges.
@@ -201,11 +215,17 @@ def correct_trim_departure(
     unknown = np.sqrt(np.diag(found.covariance))[:, None] * found.by_added
     # Only the fit that stands has intervals: the rough one before it is measured as it is.
     along_mps = 0.0 if fitted is None else gust_deviation_mps(result, trim.airspeed_mps)
-    turned = np.zeros((0, len(step)))
-    if along_mps > 0.0:
+    turned: Array = np.zeros((0, len(step)))
+    noise: Array = np.zeros((len(step), len(step)))
+    if fitted is not None:
         still = one_step.change(straight, trim, data)
-        moved = one_step.change(_with_turning_gust(straight), trim, data)
-        turned = TURNING_SHARE * along_mps * (moved - still)
+        if along_mps > 0.0:
+            moved = one_step.change(_with_turning_gust(straight), trim, data)
+            turned = TURNING_SHARE * along_mps * (moved - still)
+        noisy = [_with_airspeed_noise(varying, data, cuts, draw) for draw in range(DRAWS)]
+        drawn = [one_step.change(straight, trim, one) - still for one in noisy]
+        fitted_too = np.diag(result.covariance) > 0.0  # what the fit left out stays out
+        noise = consider_covariance(np.vstack(drawn) * fitted_too / np.sqrt(DRAWS))
     return Departure(
         found.shares,
         (
@@ -213,6 +233,7 @@ def correct_trim_departure(
             *(ShiftedEstimate(DRAG_POLAR, result.estimate + step + s, 1.0, 1.0) for s in unknown),
             *(ShiftedEstimate(TURNING_AIR, result.estimate + step + s, 1.0, 1.0) for s in turned),
         ),
+        noise,
         varying,
         _with_second_order(
             varying.model, base, dict(zip(curvature, map(float, found.added), strict=True))
@@ -253,6 +274,25 @@ def _with_second_order(
         terms=tuple(t for t in varying.terms if t.parameter not in more),
         parameters=base.parameters,
     )
+
+
+def _with_airspeed_noise(
+    varying: VaryingModel,
+    data: Sequence[Maneuver],
+    cuts: Sequence[Mapping[str, Array]],
+    draw: int,
+) -> list[Maneuver]:
+    """Return the maneuvers with white noise, as large as it is, added to the airspeed once more."""
+    rng = np.random.default_rng(draw)
+    deviation = white_deviation([c["airspeed_mps"] for c in cuts])
+    drawn = [
+        {**c, "airspeed_mps": v + deviation * rng.standard_normal(len(v))}
+        for c, v in ((c, c["airspeed_mps"]) for c in cuts)
+    ]
+    return [
+        replace(m, inputs=varying.maneuver(c, m.dt_s).inputs)
+        for m, c in zip(data, drawn, strict=True)
+    ]
 
 
 def _with_turning_gust(varying: LinearModel) -> LinearModel:
