@@ -83,7 +83,7 @@ from host.sysid.flight.reconstructed_flight import (
     flown_maneuvers,
     reconstruct_flight,
 )
-from host.sysid.flight.sampling_error import hold_shift
+from host.sysid.flight.sampling_error import hold_shift, kink_shift, with_moving_surfaces
 from host.sysid.flight.systematic_errors import add_systematic_covariance, systematic_error_shifts
 from host.sysid.flight.trim_departure import (
     NO_SPIN,
@@ -174,6 +174,8 @@ class LinearEstimator:
             used, held = brought_behind(used, servo.setting), brought_behind(held, servo.setting)
         if method == GUST and self.own is None:
             used = with_filter_step(used, model)
+        if self.own is None and sensors_known(used):
+            used, held = with_moving_surfaces(used), with_moving_surfaces(held)
         data = [m.cut(model) for m in used]
         cuts, departing = [m.inside() for m in used], [m.departing() for m in used]
         spin = spin_of(self.powerplant, departing) if self.own is None else NO_SPIN
@@ -324,9 +326,10 @@ class LinearEstimator:
             usual = first.errors or usual_errors(first.maker)
             share = airspeed_share(usual, e.condition.qbar_pa)
             shifts += airspeed_shift(statistical, e.maneuvers, e.trim, share)
-        # Of an instrument that is known surfaces are measured: they move between samples. Delays
-        # that were estimated have taken up half a sample, and their intervals count it.
-        if self.own is not None or not (e.delays or sensors_known(e.used)):
+        # Delays that were estimated have taken up half a sample, and their intervals count it.
+        if self.own is None and sensors_known(e.used):
+            shifts += kink_shift(statistical, e.maneuvers, e.used, e.trim)
+        elif self.own is not None or not e.delays:
             shifts += hold_shift(statistical, e.maneuvers, e.trim)
         found: CoefficientParts | None = None
         if self.airframe is not None and e.trim.known:

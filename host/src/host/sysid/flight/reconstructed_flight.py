@@ -16,7 +16,7 @@ from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array, BoolArray
 from host.instrument.deviations import SensorErrorModel
 from host.instrument.instrument_errors import InstrumentErrors
-from host.instrument.recording import OWN
+from host.instrument.recording import OWN, SURFACES
 from host.instrument.servo_prior import ServoPrior
 from host.near_names import like
 from host.sysid.compatibility.flow_angles import FlowAngles
@@ -31,6 +31,7 @@ from host.sysid.compatibility.sensor_corrections import (
 from host.sysid.compatibility.sensor_dynamics import columns_at_cg
 from host.sysid.flight.column_sampling import sampled_name
 from host.sysid.flight.data_finding import Finding
+from host.sysid.flight.input_kinks import with_means_of_motion
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
@@ -89,12 +90,13 @@ class ReconstructedFlight:
 @dataclass(frozen=True, slots=True)
 class FlownManeuver:
     """A maneuver in its flight; `label` is what an answer calls it, `block` how many samples are
-    averaged to one."""
+    averaged to one. `surfaces_move` between samples as `input_kinks` says, else along lines."""
 
     found: DetectedManeuver
     flight: ReconstructedFlight
     label: str
     block: int = 1
+    surfaces_move: bool = False
 
     @property
     def dt_s(self) -> float:
@@ -116,10 +118,12 @@ class FlownManeuver:
         first, last = self.found.fit_window()
         at = np.flatnonzero((t >= first) & (t <= last))
         at = at[: len(at) // self.block * self.block]
-        return {
+        cut = {
             name: values[at].reshape(-1, self.block).mean(axis=1) if self.block > 1 else values[at]
             for name, values in columns.items()
         }
+        moving = [f"{name}_rad" for name in SURFACES if self.surfaces_move]
+        return cut | {name: with_means_of_motion(cut[name]) for name in moving if name in cut}
 
     def cut(self, model: LinearModel) -> Maneuver:
         """Return inputs and outputs of a model over it.

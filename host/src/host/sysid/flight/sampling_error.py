@@ -4,6 +4,8 @@ A record says what an input was at its samples. Between them it was held, or mov
 moves by the difference. How far the data go from one hold to the other they tell themselves: that
 share is one more parameter beside the estimate. Where it moves the estimate by more than a tenth of
 an interval it is part of it. On records without noise it is most of it.
+
+Of an instrument that is known surfaces are measured: they move, kinks included (`input_kinks`).
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ from scipy import special
 from host.constants import NORMAL_95
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
 from host.sysid.flight.one_step import OneStep, one_step_of
+from host.sysid.flight.reconstructed_flight import FlownManeuver
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.templates import Trim
@@ -26,6 +29,9 @@ NEGLIGIBLE = 0.1  # of a half-width
 ONE_STEP = 1.1  # times what one step of Gauss and Newton says: the next ones may add a tenth
 NORMAL_99 = 2.576
 OTHER = {"foh": "zoh", "zoh": "foh"}
+# Of what kinks do to the estimate, one deviation: a servo of second order and 60 rad/s has none,
+# and passes for one of first order that does half as much.
+KINK_SHARE = 0.5
 
 
 def hold_shift(
@@ -56,6 +62,36 @@ def hold_shift(
     if not np.any(np.abs(step) > NEGLIGIBLE * result.half_width()):
         return ()
     return (ShiftedEstimate(HOLD, result.estimate + step / NORMAL_95, 1.0, 1.0),)
+
+
+def with_moving_surfaces(maneuvers: Sequence[FlownManeuver]) -> list[FlownManeuver]:
+    """Return maneuvers whose surfaces move between samples; means of several are smooth already."""
+    return [replace(m, surfaces_move=m.block == 1) for m in maneuvers]
+
+
+def kink_shift(
+    result: FitResult, maneuvers: Sequence[Maneuver], flown: Sequence[FlownManeuver], trim: Trim
+) -> tuple[ShiftedEstimate, ...]:
+    """Return the estimate moved by what kinks between samples leave open, as one deviation.
+
+    Parameters
+    ----------
+    result : FitResult
+    maneuvers : sequence of Maneuver
+        That were fitted.
+    flown : sequence of FlownManeuver
+        The same, with surfaces that move.
+    trim : Trim
+    """
+    found = one_step_of(result, maneuvers, trim)
+    if found is None or not any(m.surfaces_move for m in flown):
+        return ()
+    lines = [
+        replace(m, inputs=replace(f, surfaces_move=False).cut(result.model).inputs)
+        for m, f in zip(maneuvers, flown, strict=True)
+    ]
+    step = KINK_SHARE * found.change(result.model, trim, lines).sum(axis=0)
+    return (ShiftedEstimate(HOLD, result.estimate + step, 1.0, 1.0),)
 
 
 def _share(result: FitResult, found: OneStep, trim: Trim, maneuvers: Sequence[Maneuver]) -> float:
