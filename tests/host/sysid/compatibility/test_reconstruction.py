@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from host.aircraft.mass_properties import airframe_data
-from host.constants import GRAVITY_MPS2
+from host.constants import GRAVITY_MPS2, NORMAL_95
 from host.instrument.deviations import sensor_error_model
 from host.sysid.compatibility.flight_path import (
     AIR,
@@ -287,6 +287,19 @@ def test_without_gps_the_pitot_scale_is_called_unobservable() -> None:
     findings = compatibility_document(found)["findings"]
     assert isinstance(findings, dict)
     assert findings["pitot_scale"]["told"] is False
+
+
+def test_without_gps_an_error_of_the_imu_does_not_pass_for_the_vanes_zero() -> None:
+    """It moved the zero by 0.003 rad, known to 0.001."""
+    columns, _ = flown(2)
+    alone = {k: v for k, v in columns.items() if not k.startswith("v_")}
+    bias_mps2 = 3.0 * INSTRUMENT.errors["accel_bias_mps2"].of_mean()
+    biased = alone | {"ax_mps2": alone["ax_mps2"] + bias_mps2}
+    here, there = (reconstruct(x, AIRFRAME, INSTRUMENT)["alpha_zero_rad"] for x in (alone, biased))
+    assert abs(there.value - here.value) < 0.5 * bias_mps2 / GRAVITY_MPS2
+    assert there.half_width > NORMAL_95 * 0.5 * min(
+        there.prior_half_width / NORMAL_95, bias_mps2 / 3.0 / GRAVITY_MPS2
+    )
 
 
 def test_poor_data_end_in_one_line() -> None:

@@ -16,7 +16,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
-from host.constants import NORMAL_95
+from host.constants import GRAVITY_MPS2, NORMAL_95
 from host.instrument.deviations import SensorErrorModel
 from host.people_units import people_name
 from host.sysid.compatibility.calibration_consistency import (
@@ -166,6 +166,8 @@ def reconstruct(
         deviation = sd if k is None else float(np.sqrt(covariance[k, k]))
         deviation = deviation if gps else min(NO_GPS_INFLATION * deviation, sd)
         value = mean if k is None else float(fit.theta[k])
+        if name == FLOW[1] and not gps and deviation < sd:
+            value, deviation = _beside_imu((value, deviation), sd, priors)
         data_informed = deviation < POSTERIOR_PRIOR_RATIO * sd
         reason = "" if data_informed else _reason(name, gps=gps)
         if name == DELAYS[0] and instrument is not None:
@@ -188,6 +190,30 @@ def reconstruct(
         for name, q in zip(problem.model.outputs, squares, strict=True)
     }
     return Compatibility(tuple(findings), rms, when, gps, instrument, tests, vanes)
+
+
+def _beside_imu(
+    told: tuple[float, float], sd: float, priors: Mapping[str, tuple[float, float]]
+) -> tuple[float, float]:
+    """Return the zero of the alpha vane and its deviation beside errors of the IMU, rad.
+
+    Without GPS they are no unknowns: the zero takes the tilt and the bias along x, which look like
+    it. 0.003 rad of either moved it by as much, known to 0.0009, and Cn_r by 0.5 %.
+
+    Parameters
+    ----------
+    told : tuple of float
+        The zero and its deviation where the IMU has no error.
+    sd : float
+        Of the zero by its calibration.
+    priors : mapping
+        Mean and deviation of every error.
+    """
+    bias, tilt = priors["accel_bias_x_mps2"][1] / GRAVITY_MPS2, priors["imu_tilt_y_rad"][1]
+    by_data = told[1] ** -2 - sd**-2
+    measured, variance = told[0] * told[1] ** -2 / by_data, 1.0 / by_data + bias**2 + tilt**2
+    left = 1.0 / (1.0 / variance + sd**-2)
+    return measured * left / variance, float(np.sqrt(left))
 
 
 def _known_better(estimate: tuple[float, float], by_file: tuple[float, float]) -> bool:
