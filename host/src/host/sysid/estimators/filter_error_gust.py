@@ -108,6 +108,16 @@ def without_gust_parameters(result: FitResult, model: LinearModel) -> FitResult:
     )
 
 
+def _with_initial_gusts(
+    start: Array, plain: LinearModel, augmented: LinearModel, maneuvers: int
+) -> Array:
+    """Return a start with the gusts in which each maneuver begins among its constants, none."""
+    more = len(augmented.initial_states) - len(plain.initial_states)
+    common = len(plain.parameter_names)
+    constants = start[common:].reshape(maneuvers, -1)
+    return np.concatenate([start[:common], np.pad(constants, ((0, 0), (0, more))).ravel()])
+
+
 def gust_process(model: LinearModel) -> tuple[str, ...]:
     """Return the states that process noise drives."""
     rolling = (ROLL_GUST,) if set(model.states) >= ROLL_STATES else ()
@@ -129,6 +139,7 @@ def fit_gust_state(
     """
     plain, first = with_gust_penetration(model, airspeed_mps, start)
     augmented = gust_model(plain, airspeed_mps)
+    first = _with_initial_gusts(first, plain, augmented, len(maneuvers))
     noise = None
     if before is not None:
         names = [n for n in before.names if n.startswith("log_")]
