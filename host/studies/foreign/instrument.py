@@ -42,12 +42,12 @@ def with_sensor_errors(measured: Columns, rng: np.random.Generator) -> Columns:
         found[name] = measured[name] * vane + zero
     pressure = 0.5 * DENSITY_KGPM3 * measured["airspeed_mps"] ** 2
     pressure = pressure * (1.0 + drawn("pitot_scale")) + drawn("pitot_zero_pa")
-    found["airspeed_mps"] = np.sqrt(2.0 * np.maximum(pressure, 0.0) / DENSITY_KGPM3)
+    density = DENSITY_KGPM3 * (1.0 + drawn("density_share"))
+    found["airspeed_mps"] = np.sqrt(2.0 * np.maximum(pressure, 0.0) / density)
     for name, pots in (("elevator_rad", 1), ("aileron_rad", 2), ("rudder_rad", 1)):
         slope = 1.0 + np.mean([drawn("pot_scale") for _ in range(pots)])
         zero = float(np.mean([drawn("pot_zero_rad") for _ in range(pots)]))
         found[name] = measured[name] * slope + zero
-    density = DENSITY_KGPM3 * (1.0 + drawn("density_share"))
     _, _, throttle = trimmed(SPEED_MPS)  # where it stays
     found["thrust_n"] = thrust_n(throttle, found["airspeed_mps"])
     found["density_kgpm3"] = np.full(len(measured["t_s"]), density)
