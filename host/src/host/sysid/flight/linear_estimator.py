@@ -305,10 +305,14 @@ class LinearEstimator:
                     ),
                 )
         statistical = with_column_noise(statistical, e.maneuvers, e.trim)
-        statistical = inflate_covariance(statistical, maneuver_agreement(statistical))
+        noisy = statistical if e.departure is None else e.departure.with_airspeed_noise(statistical)
+        statistical = inflate_covariance(statistical, maneuver_agreement(noisy))
         statistical = inflate_by_coherence(statistical, coherence, excess)
         absent = missing_control(e.fit, at_trim, e.trim.airspeed_mps)
         statistical = widened_by_missing_control(statistical, absent)
+        # Behind what a model error multiplies: this noise is known.
+        if e.departure is not None:
+            statistical = e.departure.with_airspeed_noise(statistical)
         # Our own log is fitted in means, which lean less on what the gust is between samples.
         if others_recorded(e.used):
             statistical = with_unknown_roll_lag(statistical)

@@ -97,12 +97,11 @@ class Departure:
         if isinstance(influence := details.get("maneuver_influence"), np.ndarray):
             tested = np.any(influence != 0.0, axis=0)  # what need not agree stays out of the test
             details["maneuver_influence"] = influence + tested * self.shares
-        return replace(
-            result,
-            estimate=result.estimate + self.step,
-            covariance=result.covariance + self.airspeed_noise,
-            details=details,
-        )
+        return replace(result, estimate=result.estimate + self.step, details=details)
+
+    def with_airspeed_noise(self, result: FitResult) -> FitResult:
+        """Return the result with the noise of the airspeed in its covariance."""
+        return replace(result, covariance=result.covariance + self.airspeed_noise)
 
     def removed_from(self, maneuvers: Sequence[Maneuver], estimate: Array) -> list[Maneuver]:
         """Return the maneuvers as if nothing had departed; as they are if the model diverges.
