@@ -72,10 +72,12 @@ def shipped(name: str, flight: VirtualFlight) -> NonlinearModel:
     """Return a model of the package with the constants of the aircraft and the flight."""
     path = files("host.sysid.models").joinpath("equations", f"{name}.toml")
     document = tomllib.loads(path.read_text(encoding="utf-8"))
-    engine = powerplant(AIRCRAFT)
+    engine, table = powerplant(AIRCRAFT), flight.record.frame.alpha_nodes_rad
     known = asdict(airframe_data(AIRCRAFT)) | {
         "density_kgpm3": airborne(flight)["density_kgpm3"].mean(),
         "alpha_ref_rad": np.mean([m["condition"]["alpha_rad"] for m in of_axes(flight, "lateral")]),
+        "alpha_low_rad": table[0],
+        "alpha_high_rad": table[-1],
         "spin_kgm2ps": engine.rotor_kgm2 * airborne(flight)["rotor_radps"].mean(),
         "thrust_pitch_rad": -np.arcsin(engine.axis[2]),
         "thrust_arm_m": engine.hub_m[2] * engine.axis[0] - engine.hub_m[0] * engine.axis[2],
@@ -191,11 +193,12 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--flights", type=int, default=50, help="of each model and air")
     parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
     parser.add_argument("--models", nargs="+", choices=MODELS, default=list(MODELS))
+    parser.add_argument("--airs", nargs="+", type=float, choices=AIRS_MPS, default=list(AIRS_MPS))
     parser.add_argument("--method", help="in place of the default")
     parser.add_argument("--rows", type=Path, default=Path("../build/study/shipped_models.csv"))
     options = parser.parse_args(arguments)
     seeds = range(options.first, options.first + options.flights)
-    keys = ((m, air, seed) for seed in seeds for air in AIRS_MPS for m in options.models)
+    keys = ((m, air, seed) for seed in seeds for air in options.airs for m in options.models)
     fly = functools.partial(rows_of, method=options.method)
     rows = flown_rows(options.rows, COLUMNS, keys, fly)
     sys.stdout.write("\n".join(table_of([r for r in rows if int(r["seed"]) in seeds])) + "\n")

@@ -48,7 +48,7 @@ def test_six_degrees_fly_as_the_longitudinal_model_in_the_plane() -> None:
     V, alpha, theta, q = 16.0, 0.08, 0.2, 0.3
     x = np.array([V, alpha, theta, q, 0.0, 0.0])
     wings = rates(plane, x, np.array([0.05, 3.0, 0.0, 0.0, 0.0]))
-    x = np.array([V * np.cos(alpha), 0.0, V * np.sin(alpha), 0.0, q, 0.0, 0.0, theta])
+    x = np.array([V * np.cos(alpha), 0.0, V * np.sin(alpha), 0.0, q, 0.0, 0.0, theta, *np.zeros(5)])
     body = rates(space, x, np.array([0.05, 0.0, 0.0, 3.0]))
     u, w = x[0], x[2]
     assert (u * body["u_mps"] + w * body["w_mps"]) / V == pytest.approx(wings["airspeed_mps"])
@@ -65,7 +65,9 @@ def test_six_degrees_roll_and_yaw_as_the_lateral_model_to_first_order() -> None:
     beta, p, r, da, dr = 1e-5, 2e-5, -1e-5, 1e-5, 3e-5
     air = np.zeros(3)
     own = rates(side, np.array([beta, p, r, phi, *air]), np.array([da, dr, V, alpha, theta, 0.0]))
-    x = np.array([V * np.cos(alpha), V * beta, V * np.sin(alpha), p, 0.0, r, phi, theta])
+    x = np.array(
+        [V * np.cos(alpha), V * beta, V * np.sin(alpha), p, 0.0, r, phi, theta, *np.zeros(5)]
+    )
     body = rates(space, x, np.array([0.0, da, dr, 3.0]))
     assert body["p_radps"] == pytest.approx(own["p_radps"], rel=1e-6)
     assert body["r_radps"] == pytest.approx(own["r_radps"], rel=1e-6)
@@ -92,6 +94,24 @@ def test_a_rolling_gust_moves_the_aircraft_as_its_own_roll_does_the_other_way() 
     own = rates(side, np.array([0, 0.2, 0, 0, 0, 0, 0]), u)
     for name in ("p_radps", "r_radps"):
         assert air[name] - still[name] == pytest.approx(still[name] - own[name])
+
+
+def test_the_air_of_six_degrees_is_that_of_the_files_of_one_plane() -> None:
+    plane, side, space = shipped("longitudinal"), shipped("lateral"), shipped("six_degrees")
+    V, alpha, theta, w, behind = 16.0, 0.08, 0.2, 0.4, 0.1
+    wings = rates(
+        plane, np.array([V, alpha, theta, 0.0, w, behind]), np.array([0.05, 3.0, 0.0, 0.0, 0.0])
+    )
+    path = [V * np.cos(alpha), 0.0, V * np.sin(alpha), 0.0, 0.0, 0.0, 0.0, theta]
+    body = rates(space, np.array([*path, w, behind, *np.zeros(3)]), np.array([0.05, 0, 0, 3.0]))
+    assert body["q_radps"] == pytest.approx(wings["q_radps"])
+    beta, lagged, roll = 1e-5, 4e-6, 2e-5
+    level = np.array([0.0, 0.0, 0.0, 0.0, beta, lagged, roll])
+    own = rates(side, level, np.array([0.0, 0.0, V, alpha, theta, 0.0]))
+    air = np.array([*path, 0.0, 0.0, V * beta, V * lagged, roll])
+    body = rates(space, air, np.array([0.0, 0.0, 0.0, 3.0]))
+    assert body["r_radps"] == pytest.approx(own["r_radps"], rel=1e-6)
+    assert body["p_radps"] == pytest.approx(own["p_radps"], rel=1e-6)
 
 
 def test_flight_path_of_an_aircraft_at_rest_in_a_turn_stands_still() -> None:

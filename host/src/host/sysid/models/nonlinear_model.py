@@ -200,6 +200,10 @@ class NonlinearModel(LinearModel):
         own = {p.name: p.unit for p in self.own_parameters if p.unit}
         return LinearModel.stated_units(self) | own
 
+    def controls(self) -> tuple[str, ...]:
+        """Return the inputs that a pilot moves; measured columns follow the air as outputs do."""
+        return self.inputs[: self.source.controls]
+
     def delayed_signals(self) -> tuple[str, ...]:
         """Return the signals that may be delayed: inputs too."""
         return (*self.outputs, *self.inputs)

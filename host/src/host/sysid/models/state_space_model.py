@@ -234,6 +234,10 @@ class LinearModel:
         """Return the units of parameters of which the user states them."""
         return {p.name: p.unit for p in self.parameters if p.unit}
 
+    def controls(self) -> tuple[str, ...]:
+        """Return the inputs that a pilot moves."""
+        return self.inputs
+
     def delayed_signals(self) -> tuple[str, ...]:
         """Return the signals that may be delayed."""
         return self.outputs
