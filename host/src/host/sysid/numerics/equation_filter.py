@@ -15,6 +15,7 @@ from host.compiled import compiled_part
 from host.sysid.expressions.equation_code import of_equations
 from host.sysid.numerics.equation_recursion import (
     STATE_LIMIT,
+    multiply,
     rate_slopes,
     rates,
     reading_slopes,
@@ -39,19 +40,6 @@ def input_within(inputs: Array, k: int, share: float, ramp: float, u: Array) -> 
     """Write the inputs within the step behind sample `k` into `u`."""
     for j in range(inputs.shape[1]):
         u[j] = inputs[k, j] + ramp * share * (inputs[k + 1, j] - inputs[k, j])
-
-
-@compiled_part
-def multiply(a: Array, b: Array, out: Array) -> None:
-    """Write a b into `out`; of so small matrices a tenth of what `numpy.dot` takes."""
-    for i in range(a.shape[0]):
-        for j in range(b.shape[1]):
-            out[i, j] = 0.0
-        for k in range(a.shape[1]):
-            x = a[i, k]
-            if x != 0.0:
-                for j in range(b.shape[1]):
-                    out[i, j] += x * b[k, j]
 
 
 @of_equations
