@@ -1,15 +1,18 @@
 """What inputs drive beside a model is told from noise of any colour, and false alarms are few."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from host.sysid.estimators.method_registry import fit
+from host.sysid.models.equation_file import equations_from
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.ar_noise import autocovariance
 from host.sysid.numerics.input_coherence import InputCoherence, block_means, input_coherence
 from host.sysid.numerics.input_regressors import input_regressors, lag_knots_s
+from host.sysid.numerics.nonlinear_problem import output_problem
 from host.sysid.numerics.output_error import minimise
 from host.sysid.numerics.output_error_problem import OutputProblem
 from scipy import signal
@@ -94,6 +97,36 @@ def test_output_error_widens_by_what_its_noise_had_explained() -> None:
     assert abs(result.estimate[k] - truth) > result.half_width()[k] / factor  # it was too narrow
     right = fit("output-error", navion_structured(), [record(3, "AR(1) 0.9", snr=40.0)])
     assert "driven_by_inputs" not in right.details
+
+
+@pytest.mark.parametrize(("kind", "named"), [("columns", ()), ("inputs", ("p_radps",))])
+def test_a_measured_column_is_no_input_of_a_pilot(
+    monkeypatch: pytest.MonkeyPatch, kind: str, named: tuple[str, ...]
+) -> None:
+    """Thrust follows the air that the output feels: no error of the model."""
+    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
+    document: dict[str, Any] = {
+        "kind": "equations",
+        "inputs": ["aileron_rad"],
+        "constants": {"none": 0.0},
+        "rates": {"p_radps": "L_p*p_radps + L_da*aileron_rad + none*thrust_n"},
+        "outputs": {"p_radps": "p_radps"},
+        "parameters": {"L_p": -4.0, "L_da": 30.0},
+    }
+    document[kind] = [*document.get(kind, ()), "thrust_n"]
+    rng = np.random.default_rng(5)
+    aileron = multistep_3211(0.05, DT_S, DURATION_S)
+    thrust = signal.lfilter([1.0], [1.0, -0.95], rng.standard_normal((len(aileron), 1)), axis=0)
+    u = np.hstack([aileron, thrust])
+    model = equations_from(document, "roll")
+    theta = np.array([-4.0, 30.0, 0.0])
+    clean = output_problem(model, [Maneuver(DT_S, u, np.zeros((len(u), 1)))]).outputs(theta)
+    assert clean is not None
+    measured = clean[0].T + 0.2 * thrust + 0.1 * rng.standard_normal((len(u), 1))
+    problem = output_problem(model, [Maneuver(DT_S, u, measured)])
+    responses = problem.respond(theta)
+    assert responses is not None
+    assert input_coherence(problem, responses, theta).coherent == named
 
 
 def test_lags_reach_seconds_in_few_columns() -> None:

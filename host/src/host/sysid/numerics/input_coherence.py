@@ -4,7 +4,8 @@ The columns of `input_regressors` are added to one output. If the model is right
 more than noise does by chance: an F test of the added columns, everything whitened by AR models of
 the noise and freed of what the model's own parameters could still take (a Lagrange multiplier test;
 Engle, Handbook of Econometrics II, 1984, ch. 13). All lags are tested as one, so their number is
-counted by the degrees of freedom; the number of outputs by Sidak's level.
+counted by the degrees of freedom; the number of outputs by Sidak's level. Inputs are what a pilot
+moves: thrust and bank, measured columns of a user's equations, follow the gusts that outputs feel.
 
 A second test asks for the signatures of usual errors (`model_error_signatures`), each with its own
 shape in all outputs at once, so that a small error is seen; the level of 1 % is shared by halves.
@@ -263,7 +264,7 @@ def _data(problem: OutputProblem, responses: Sequence[Response], block_s: float)
     knots_s = lag_knots_s(max(m.dt_s for m in problem.maneuvers), shortest_s)
     moving = [j for j, y in enumerate(model.outputs) if y in model.states]
     added = [
-        input_regressors(m.inputs, r.y[moving].T, m.dt_s, knots_s)
+        input_regressors(m.inputs[:, : len(model.controls())], r.y[moving].T, m.dt_s, knots_s)
         for m, r in zip(problem.maneuvers, responses, strict=True)
     ]
     blocks = [block_length(m.dt_s, block_s) for m in problem.maneuvers]

@@ -69,14 +69,14 @@ def model_error_signatures(
 
     for row in free_rows:
         unit, state = np.eye(len(A))[row], model.states[row]
-        for label, values in (*moving.items(), *zip(model.inputs, u.T, strict=True)):
+        for label, values in (*moving.items(), *zip(model.controls(), u.T, strict=False)):
             if (row, label) not in own:
                 add(f"{label} in the equation of {state}", values[:, None] * unit)
         for label, values in moving.items():
             if (row, label) in own:
                 bent = values * np.abs(values)
                 add(f"{label} beyond linear in the equation of {state}", bent[:, None] * unit)
-    for k, label in enumerate(model.inputs):
+    for k, label in enumerate(model.controls()):
         rate = np.gradient(u[:, k], maneuver.dt_s)
         add(f"a lag of {label}", np.outer(rate, B[:, k]), np.outer(rate, D[:, k]))
     for j, label in enumerate(model.outputs):
