@@ -13,6 +13,7 @@ from host.sysid.estimators.servo_parameters import SERVO, ServoEstimate, ServoNu
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import identify
+from host.sysid.flight.prediction_limits import Prediction
 from host.sysid.models.templates import Trim, template
 from studies.wrong_flights import LinearFlight, fly
 
@@ -79,6 +80,21 @@ def test_noise_of_a_sensor_is_no_failure_of_the_fit(right: Answer) -> None:
     missed = replace(right, fits=(replace(alpha, nrmse=0.6, ljung_box_p=1e-9),))
     assert relied_on(noisy) == relied_on(right)
     assert not relied_on(missed) & {"Z_alpha", "M_alpha"}
+
+
+def test_what_gusts_among_the_states_make_is_no_failure(right: Answer) -> None:
+    """Airspeed in gusts: a free simulation misses it by more than half, as its own air says."""
+    alpha = replace(right.fits[0], nrmse=0.8, ljung_box_p=1e-9)
+    missed = replace(right, fits=(alpha,), validation=(alpha,))
+    for allowed, relied in (
+        (Prediction(0.8, 1.1, by_gusts=True), True),
+        (Prediction(0.8, 0.7, by_gusts=True), False),
+        (Prediction(0.8, 1.1), False),
+    ):
+        judged = replace(missed, predictions={alpha.name: allowed}, explained={})
+        assert not relied_on(judged) & {"M_alpha"}  # the maneuvers fitted fail
+        judged = replace(judged, explained={alpha.name: allowed})
+        assert ("M_alpha" in relied_on(judged)) == relied
 
 
 def test_an_unseen_maneuver_that_noise_cannot_explain_is_not_predicted(

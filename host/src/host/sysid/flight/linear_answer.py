@@ -58,6 +58,7 @@ class Answer:
     own_model: bool = False  # of the user, not a template
     coherence: InputCoherence | None = None  # of what free simulation leaves with the inputs
     predictions: dict[str, Prediction] = field(default_factory=dict)  # of outputs held out
+    explained: dict[str, Prediction] = field(default_factory=dict)  # of outputs fitted, in gusts
     noise_covariance: Array | None = None  # of the estimate, without systematic errors
     coefficient_parts: CoefficientParts | None = None
     causes: dict[str, str] = field(default_factory=dict)  # what widens each interval most

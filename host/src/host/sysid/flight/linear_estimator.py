@@ -76,7 +76,7 @@ from host.sysid.flight.linear_stages import LinearEstimate, LinearIntervals, Lin
 from host.sysid.flight.maneuver_detection import DetectedManeuver, Grade, detect_maneuvers, grade
 from host.sysid.flight.maneuver_selection import HELD_OUT_FROM, excited_axes, joined_windows
 from host.sysid.flight.noise_model_limits import excess_over_noise_model
-from host.sysid.flight.prediction_limits import predictions
+from host.sysid.flight.prediction_limits import Prediction, driven_states, predictions
 from host.sysid.flight.reconstructed_flight import (
     FlownManeuver,
     ReconstructedFlight,
@@ -371,12 +371,16 @@ class LinearEstimator:
             )
         )
         held_out_runs = _simulated(frozen, held_out, at_trim)
+        explained: dict[str, Prediction] = {}
+        if driven_states(e.model, total):
+            explained = predictions(e.model, total, intervals.coherence, e.maneuvers, simulated)
         return LinearValidation(
             tuple(simulated),
             fits_of(e.model, e.maneuvers, simulated),
             fits_of(e.model, held_out, held_out_runs),
             predictions(e.model, total, intervals.coherence, held_out, held_out_runs),
             tuple(zip(held_out, held_out_runs, strict=True)),
+            explained,
         )
 
     def answer(
@@ -414,6 +418,7 @@ class LinearEstimator:
             own_model=self.own is not None,
             coherence=intervals.coherence,
             predictions=validation.predictions,
+            explained=validation.explained,
             held_out_runs=validation.held_out_runs,
             noise_covariance=statistical.covariance,
             causes=widest_errors(e.fit, intervals.statistical, intervals.total, intervals.shifts),

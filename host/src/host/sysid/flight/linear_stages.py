@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from host.aircraft.mass_properties import Condition
 from host.arrays import Array
@@ -92,7 +92,8 @@ class LinearValidation:
 
     Departures from the trim are as measured: airspeed and attitude in products with what moves.
     `predictions` sets the error of each output held out beside what noise and covariance allow;
-    `held_out_runs` are the maneuvers held out, with their outputs.
+    `held_out_runs` are the maneuvers held out, with their outputs. `explained` is the same of the
+    maneuvers fitted, where gusts are among the states of the model.
     """
 
     simulated: tuple[Array, ...]
@@ -100,3 +101,4 @@ class LinearValidation:
     held_out: tuple[SignalFit, ...]
     predictions: dict[str, Prediction]
     held_out_runs: tuple[tuple[Maneuver, Array], ...] = ()
+    explained: dict[str, Prediction] = field(default_factory=dict)

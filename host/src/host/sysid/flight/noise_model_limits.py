@@ -64,7 +64,7 @@ def excess_over_noise_model(
         block = block_length(maneuver.dt_s)
         left = block_means((problem.measured(number) - response.y).T, block)
         slopes = np.stack([block_means(J[:, count:], block) for J in response.sensitivities])
-        errors_drawn = _random_errors(rng, wide, result, process, maneuver.dt_s, block, len(left))
+        errors_drawn = random_errors(rng, wide, result, process, maneuver.dt_s, block, len(left))
         for j, errors in enumerate(errors_drawn[:, :, :AR_DRAWS]):
             none = [np.zeros((len(errors), 0))] * AR_DRAWS
             moments[j] += lagged_moments(list(errors.T), none, HIGHEST_ORDER)
@@ -91,7 +91,7 @@ def excess_over_noise_model(
     return NoiseExcess(power, variance_ratio(problem, responses, noise, variance, power))
 
 
-def _random_errors(
+def random_errors(
     rng: np.random.Generator,
     wide: LinearModel,
     result: FitResult,
@@ -100,7 +100,22 @@ def _random_errors(
     block: int,
     means: int,
 ) -> Array:
-    """Return outputs of a model that process noise alone drives, and their noise, (p, n, draws)."""
+    """Return outputs of a model that process noise alone drives, and their noise, (p, n, draws).
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    wide : LinearModel
+        With the states that process noise drives.
+    result : FitResult
+        Of filter error.
+    process : sequence of str
+        Those states.
+    dt_s : float
+    block : int
+        Samples of a mean.
+    means : int
+    """
     A, _, C, _ = wide.matrices(result.estimate[: len(wide.parameters)])
     index = [wide.states.index(s) for s in process]
     intensity = np.zeros(len(A))

@@ -1,7 +1,8 @@
 """How far a right model may miss a maneuver that it never saw: noise, gusts, its own covariance.
 
 The noise of an output is an AR model of what a free simulation leaves of the fitted maneuvers and
-the inputs do not drive (`numerics.input_coherence`); gusts are in it. The parameters are uncertain
+the inputs do not drive (`numerics.input_coherence`); gusts are in it. Of filter error with states
+that gusts drive it is what these make of it, told one sample ahead. The parameters are uncertain
 by their whole covariance. Constants and start states are fitted to the unseen maneuver too, which
 takes its part out of the error. Errors are drawn at random, and a gamma distribution through their
 mean squares gives the limit.
@@ -16,7 +17,9 @@ import numpy as np
 from scipy import special
 
 from host.arrays import Array
+from host.sysid.estimators.innovations import PROCESS
 from host.sysid.flight.free_simulation import free_responses, weighted_fit
+from host.sysid.flight.noise_model_limits import DRAWS, random_errors
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
@@ -24,7 +27,7 @@ from host.sysid.numerics.ar_noise import ArNoise, autocovariance
 from host.sysid.numerics.input_coherence import InputCoherence, block_length, block_means
 
 SIGNIFICANCE = 0.01
-DRAWS, DRAW_SEED = 100, 1
+DRAW_SEED = 1
 LONGEST_LAG = 200  # of an autocorrelation that counts, means
 SETTLING = 200  # means before a drawn AR series counts
 
@@ -39,10 +42,13 @@ class Prediction:
         Rms error over the deviation of the output.
     largest : float
         What noise, gusts and the covariance of the parameters allow.
+    by_gusts : bool
+        It is what gusts among the states of the model make, not what was left of other maneuvers.
     """
 
     nrmse: float
     largest: float
+    by_gusts: bool = False
 
     @property
     def holds(self) -> bool:
@@ -80,9 +86,17 @@ def predictions(
     spread = np.sqrt(np.mean(np.vstack([y - y.mean(axis=0) for y in measured]) ** 2, axis=0))
     rms = np.sqrt(np.mean(error**2, axis=0)) / np.maximum(spread, 1e-300)
     largest = largest_rms(model, result, noise, maneuvers) / np.maximum(spread, 1e-300)
+    by_gusts = bool(driven_states(model, result))
     return {
-        name: Prediction(float(rms[k]), float(largest[k])) for k, name in enumerate(model.outputs)
+        name: Prediction(float(rms[k]), float(largest[k]), by_gusts)
+        for k, name in enumerate(model.outputs)
     }
+
+
+def driven_states(model: LinearModel, result: FitResult) -> list[str]:
+    """Return the states of the model that process noise of a fit drives; none of other methods."""
+    process = [n.removeprefix(PROCESS) for n in result.names if n.startswith(PROCESS)]
+    return process if set(process) <= set(model.states) else []
 
 
 def largest_rms(
@@ -103,18 +117,22 @@ def largest_rms(
     squares, samples = np.zeros((DRAWS, outputs)), 0
     freedom = [power_freedom(memory, noise.samples) for memory in noise.noise]
     scale = np.sqrt(np.array([nu / rng.chisquare(nu, DRAWS) for nu in freedom]))  # of its power
+    process = driven_states(model, result)
     for maneuver in maneuvers:
         slopes = _slopes(model, result, maneuver)
         if slopes is None:
             return np.full(outputs, np.inf)
         means = slopes.shape[1]
-        errors = np.stack(
-            [
-                random_noise(rng, memory, variance, means, DRAWS)
-                for memory, variance in zip(noise.noise, noise.innovation_variance, strict=True)
-            ]
-        )  # (p, means, draws)
-        errors *= scale[:, None, :]
+        if process:
+            block = block_length(maneuver.dt_s)
+            errors = random_errors(rng, model, result, process, maneuver.dt_s, block, means)
+        else:
+            errors = scale[:, None, :] * np.stack(
+                [
+                    random_noise(rng, memory, variance, means, DRAWS)
+                    for memory, variance in zip(noise.noise, noise.innovation_variance, strict=True)
+                ]
+            )  # (p, means, draws)
         errors += slopes[:, :, :count] @ parameters.T
         left = _without_constants(errors, slopes[:, :, count:], np.mean(errors**2, axis=(1, 2)))
         squares += np.sum(left**2, axis=1).T
