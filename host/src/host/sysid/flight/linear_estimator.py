@@ -14,77 +14,55 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
-from host.instrument.deviations import airspeed_share
-from host.instrument.instrument_errors import InstrumentErrors, usual_errors
+from host.instrument.instrument_errors import InstrumentErrors
 from host.instrument.recording import OWN
 from host.sysid.aerodynamics.coefficient_table import (
     Coefficient,
-    CoefficientParts,
-    ShiftedEstimate,
-    coefficient_parts,
     coefficients,
     trim_of,
 )
-from host.sysid.aerodynamics.path_thrust import path_thrust
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_corrections import corrections
-from host.sysid.compatibility.sensor_dynamics import IMU_DELAY, SERVO_DELAY
-from host.sysid.estimators.coherence_inflation import inflate_by_coherence, widened_to
 from host.sysid.estimators.filter_error_gust import (
-    GustFit,
-    fit_with_gust,
     without_gust_parameters,
 )
-from host.sysid.estimators.gust_delays import advance_outputs
 from host.sysid.estimators.gust_model import VANES
 from host.sysid.estimators.gust_penetration import (
-    with_unknown_roll_lag,
     without_gust_penetration,
 )
 from host.sysid.estimators.method_registry import fit, refuse_unless_finite
-from host.sysid.estimators.missing_control import missing_control, widened_by_missing_control
 from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
-from host.sysid.flight.airspeed_tolerance import airspeed_shift
-from host.sysid.flight.column_noise import with_column_noise
 from host.sysid.flight.commanded_surfaces import brought_behind, servo_of
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.filter_step import (
-    feels_roll,
-    others_recorded,
-    rolling_gust_identifiable,
     sensors_known,
     with_filter_step,
 )
 from host.sysid.flight.first_departures import first_departures, remove_departures
-from host.sysid.flight.free_simulation import (
-    fits_of,
-    free_responses,
-    free_simulation,
-    frozen_model,
+from host.sysid.flight.fitted_maneuvers import (
+    NoManeuverError,
+    columns_of,
+    fitted_and_held_out,
 )
+from host.sysid.flight.gust_at_trim import fit_gust_at_trim
 from host.sysid.flight.linear_answer import Answer
+from host.sysid.flight.linear_intervals import linear_intervals
 from host.sysid.flight.linear_model import (
     AXIS_OF,
     DEFAULT_METHOD,
     GUST,
-    fitted_template,
-    frees_places,
-    with_drag_arm,
-    without_attitude,
+    model_and_method,
 )
 from host.sysid.flight.linear_stages import LinearEstimate, LinearIntervals, LinearValidation
+from host.sysid.flight.linear_validation import linear_validation
 from host.sysid.flight.maneuver_detection import DetectedManeuver, Grade, detect_maneuvers, grade
-from host.sysid.flight.maneuver_selection import HELD_OUT_FROM, excited_axes, joined_windows
-from host.sysid.flight.noise_model_limits import excess_over_noise_model
-from host.sysid.flight.prediction_limits import Prediction, driven_states, predictions
+from host.sysid.flight.maneuver_selection import excited_axes
 from host.sysid.flight.reconstructed_flight import (
     FlownManeuver,
     ReconstructedFlight,
-    flown_maneuvers,
     reconstruct_flight,
 )
-from host.sysid.flight.sampling_error import hold_shift, kink_shift, with_moving_surfaces
-from host.sysid.flight.systematic_errors import add_systematic_covariance, systematic_error_shifts
+from host.sysid.flight.sampling_error import with_moving_surfaces
 from host.sysid.flight.trim_departure import (
     NO_SPIN,
     Departure,
@@ -101,24 +79,10 @@ from host.sysid.models.diagnostics import (
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.modal_analysis import modes
-from host.sysid.models.residual_delays import (
-    delays_of,
-    without_standard_delays,
-)
-from host.sysid.models.state_space_model import DelayGroup, LinearModel
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
-from host.sysid.numerics.input_coherence import input_coherence
-from host.sysid.numerics.maneuver_agreement import inflate_covariance, maneuver_agreement
-from host.sysid.numerics.score_variance import white_fit_variance
-
-
-class NoManeuverError(IdentificationError):
-    """No maneuver that a model could be fitted to."""
-
 
 FREE = ("output", "innovation")  # residuals of methods that simulate
-WHITE = "output error (white)"  # its noise is judged beside what the inputs drive
-WEAK_GRADE = 0.2
 
 
 @dataclass(frozen=True)
@@ -158,9 +122,12 @@ class LinearEstimator:
         IdentificationError
             If there is no such maneuver, a column is missing, or the fit does not come about.
         """
-        used, held = self._maneuvers(flights)
-        trim, condition = trim_of(_maneuver_columns(used))
-        model, method, remarks = self._model(used, trim)
+        own = self.own
+        axes = AXIS_OF[self.template] if own is None else excited_axes(own.inputs)
+        named = self.named or own is not None
+        used, held = fitted_and_held_out(flights, axes, self.template, named=named)
+        trim, condition = trim_of(columns_of(used))
+        model, method, remarks = model_and_method(used, trim, self.template, self.method, own)
         gusty = (
             method == GUST
             and self.own is None
@@ -182,7 +149,7 @@ class LinearEstimator:
         delays: dict[str, tuple[float, float]] = {}
         fitted = None
         if gusty:
-            staged, data, fitted = self._with_gust(model, data, cuts, trim, spin)
+            staged, data, fitted = fit_gust_at_trim(model, data, cuts, trim, self.airframe, spin)
             found, model, delays = staged.result, staged.model, staged.delays
         elif self.own is not None:
             speed = trim.airspeed_mps if trim.known else None
@@ -243,145 +210,14 @@ class LinearEstimator:
             return [np.zeros_like(m.cut(bare).outputs) for m in used]
         return first_departures(bare, used, departure_of)
 
-    def _with_gust(
-        self,
-        model: LinearModel,
-        data: Sequence[Maneuver],
-        cuts: Sequence[Mapping[str, Array]],
-        trim: Trim,
-        spin: tuple[float, float],
-    ) -> tuple[GustFit, list[Maneuver], list[Maneuver]]:
-        """Fit with the gust as a state, departures from the trim removed at a first such fit.
-
-        One step behind the fit does not do: in calm air the IMU seemed 0.3 ms late by what the
-        drag polar does to ax, and M_q was 1.8 % off. Nor does output error in front of it: in
-        gusts of 1 m/s its M_alpha was up to six times too large.
-
-        Returns
-        -------
-        GustFit, list of Maneuver, list of Maneuver
-            The fit, and the maneuvers without delays: as measured, and as fitted.
-        """
-        bare = replace(model, delays=())
-        rough = fit_with_gust(bare, data, trim.airspeed_mps, roughly=True).result
-        at_trim, before = list(data), None
-        if rough.residual_kind == "innovation":
-            departure = correct_trim_departure(rough, data, cuts, self.airframe, trim, spin)
-            before = rough if departure is None else departure.corrected(rough)
-            if departure is not None:
-                at_trim = departure.removed_from(data, before.estimate)
-        staged = fit_with_gust(model, at_trim, trim.airspeed_mps, before)
-        delays_s = {name: value for name, (value, _) in staged.delays.items()}
-        measured = [advance_outputs(m, model, delays_s) for m in data]
-        # What the fit says of the data as measured, departures with it.
-        fitted = tuple(
-            y + m.outputs - still.outputs
-            for y, m, still in zip(staged.result.fitted, measured, staged.maneuvers, strict=True)
-        )
-        staged = replace(staged, result=replace(staged.result, fitted=fitted))
-        return staged, measured, list(staged.maneuvers)
-
     def intervals(self, estimate: LinearEstimate) -> LinearIntervals:
         """Return the covariance from noise and repeats, and from every systematic error."""
-        e = estimate
-        fit_at_trim = e.fit if e.departure is None else e.departure.corrected(e.fit)
-        statistical = fit_at_trim
-        # Airspeed that varied is known: what it does is no model error.
-        at_trim = e.at_trim(e.estimate)
-        free = free_responses(e.model, e.estimate, at_trim)
-        coherence = excess = None
-        if free is not None:
-            coherence = input_coherence(free.problem, free.responses, free.theta)
-            excess = excess_over_noise_model(free, statistical, e.trim.airspeed_mps)
-            # Before maneuvers are compared: by noise without memory a gust made them disagree.
-            if statistical.method == WHITE:
-                statistical = widened_to(
-                    statistical,
-                    white_fit_variance(
-                        free.problem,
-                        free.responses,
-                        coherence.noise,
-                        coherence.innovation_variance,
-                    ),
-                )
-        statistical = with_column_noise(statistical, e.maneuvers, e.trim)
-        noisy = statistical if e.departure is None else e.departure.with_airspeed_noise(statistical)
-        statistical = inflate_covariance(statistical, maneuver_agreement(noisy))
-        statistical = inflate_by_coherence(statistical, coherence, excess)
-        absent = missing_control(e.fit, at_trim, e.trim.airspeed_mps)
-        statistical = widened_by_missing_control(statistical, absent)
-        # Behind what a model error multiplies: this noise is known.
-        if e.departure is not None:
-            statistical = e.departure.with_airspeed_noise(statistical)
-        # Our own log is fitted in means, which lean less on what the gust is between samples.
-        if others_recorded(e.used):
-            statistical = with_unknown_roll_lag(statistical)
-        shifts: tuple[ShiftedEstimate, ...] = () if e.departure is None else e.departure.remainders
-        carriers = [m.flight.compatibility for m in e.used]
-        known = [c for c in carriers if c is not None]
-        if len(known) == len(carriers):
-            moved = systematic_error_shifts(statistical, e.maneuvers, e.cuts, known, e.trim)
-            # Of servos that were estimated the covariance has what they leave open, and the IMU's
-            # delay with it: all outputs later are all inputs earlier.
-            estimated = () if e.servo is None else (SERVO_DELAY, IMU_DELAY)
-            shifts += tuple(s for s in moved if s.error not in estimated)
-        if self.airframe is None:
-            first = e.used[0].flight
-            usual = first.errors or usual_errors(first.maker)
-            share = airspeed_share(usual, e.condition.qbar_pa)
-            shifts += airspeed_shift(statistical, e.maneuvers, e.trim, share)
-        # Delays that were estimated have taken up half a sample, and their intervals count it.
-        if self.own is None and sensors_known(e.used):
-            shifts += kink_shift(statistical, e.maneuvers, e.used, e.trim)
-        elif self.own is not None or not e.delays:
-            shifts += hold_shift(statistical, e.maneuvers, e.trim)
-        found: CoefficientParts | None = None
-        if self.airframe is not None and e.trim.known:
-            own = e.used[0].flight.instrument
-            errors = own.errors if own is not None else None
-            thrust = path_thrust(e.cuts, self.powerplant, self.airframe, e.trim, e.condition)
-            found = coefficient_parts(
-                statistical, self.airframe, e.condition, shifts, errors, thrust
-            )
-        return LinearIntervals(
-            statistical, coherence, shifts, add_systematic_covariance(statistical, shifts), found
-        )
+        own = self.own is not None
+        return linear_intervals(estimate, self.airframe, self.powerplant, own=own)
 
     def validation(self, estimate: LinearEstimate, intervals: LinearIntervals) -> LinearValidation:
         """Simulate the model freely over the maneuvers fitted and those held out."""
-        e, total = estimate, intervals.total
-        # Of frequencies the residuals are not those of samples.
-        ours = total.residual_kind == "output" and all(
-            y.shape == m.outputs.shape for y, m in zip(total.fitted, e.maneuvers, strict=True)
-        )
-        same = ours and not intervals.shifts
-        frozen = frozen_model(e.model, total)
-        simulated = (
-            list(total.fitted)
-            if same
-            else _simulated(frozen, e.maneuvers, e.at_trim(total.estimate))
-        )
-        late = delays_of(e.model.outputs) if self.own is None else self.own.delays
-        held_out = [_without_delays(m.cut(e.model), e.model, late, e.delays) for m in e.held_out]
-        at_trim = (
-            held_out
-            if e.departure is None
-            else e.departure.removed_from_held_out(
-                held_out, [m.departing() for m in e.held_out], total.estimate
-            )
-        )
-        held_out_runs = _simulated(frozen, held_out, at_trim)
-        explained: dict[str, Prediction] = {}
-        if driven_states(e.model, total):
-            explained = predictions(e.model, total, intervals.coherence, e.maneuvers, simulated)
-        return LinearValidation(
-            tuple(simulated),
-            fits_of(e.model, e.maneuvers, simulated),
-            fits_of(e.model, held_out, held_out_runs),
-            predictions(e.model, total, intervals.coherence, held_out, held_out_runs),
-            tuple(zip(held_out, held_out_runs, strict=True)),
-            explained,
-        )
+        return linear_validation(estimate, intervals, self.own)
 
     def answer(
         self, estimate: LinearEstimate, intervals: LinearIntervals, validation: LinearValidation
@@ -423,101 +259,6 @@ class LinearEstimator:
             noise_covariance=statistical.covariance,
             causes=widest_errors(e.fit, intervals.statistical, intervals.total, intervals.shifts),
         )
-
-    def _maneuvers(
-        self, flights: Sequence[ReconstructedFlight]
-    ) -> tuple[list[FlownManeuver], list[FlownManeuver]]:
-        """Return the maneuvers to fit and those to hold out."""
-        every = [f for flight in flights for f in flight.maneuvers]
-        if not every:
-            raise NoManeuverError(
-                "no maneuver found: no surface moved by more than 1.4 degrees at once; give"
-                " argument from_s and argument to_s, or fly a doublet or 3-2-1-1 of 3 degrees or"
-                " more"
-            )
-        axes = AXIS_OF[self.template] if self.own is None else excited_axes(self.own.inputs)
-        named = self.named or self.own is not None
-        mine = flown_maneuvers(
-            flights,
-            joined_windows(
-                [[f for f in x.maneuvers if f.axis in axes or (f.given and named)] for x in flights]
-            ),
-        )
-        # The order in which flights are given shall not choose the maneuver that is held out.
-        mine.sort(key=lambda m: [(f.start_s, f.end_s, f.amplitude) for f in m.flight.maneuvers])
-        if not mine:
-            given = "; argument models names it all the same" if every[0].given else ""
-            raise NoManeuverError(
-                f"no maneuver of {', '.join(axes)} for {self.template}; found"
-                f" only {', '.join(sorted({f.axis for f in every}))}{given}"
-            )
-        good = [
-            m
-            for m in mine
-            if m.found.given or grade(m.flight.corrected, m.found).score >= WEAK_GRADE
-        ] or mine
-        held = _held_out([m for m in good if not m.found.given])
-        return [m for m in good if m not in held], [
-            replace(m, found=m.found.response()) for m in held
-        ]
-
-    def _model(
-        self, used: Sequence[FlownManeuver], trim: Trim
-    ) -> tuple[LinearModel, str, tuple[str, ...]]:
-        """Return the model to fit, the method that the default one comes to, and remarks."""
-        if self.method == GUST and self.own is None and not trim.known:
-            raise IdentificationError(
-                f"{GUST} needs airspeed_mps, which tells how fast gusts pass; give another method"
-            )
-        flight = used[0].flight
-        free = frees_places(self.method)
-        able = free and all(m.flight.delays_open for m in used)
-        remarks: tuple[str, ...] = ()
-        if self.own is None:
-            shared = set.intersection(*(set(m.flight.corrected) for m in used))
-            model, remarks = fitted_template(
-                shared, self.template, used, trim, self.method, able=able
-            )
-        else:
-            model = self.own if able else without_standard_delays(self.own)
-        instrument = None if flight.compatibility is None else flight.compatibility.instrument
-        if self.own is None and instrument is not None and free:
-            model = with_drag_arm(model, trim, instrument)
-        method = self.method
-        if method == DEFAULT_METHOD and self.own is None:
-            # A filter takes the line between two values of a slow sensor for measurements.
-            evenly = not any(m.cut(model).held for m in used)
-            # Of our own log laterally only where its sensors are known (`filter_step`).
-            rolls = feels_roll(model) and rolling_gust_identifiable(used)
-            vane = "beta_rad" if rolls else "alpha_rad"
-            measured = vane in model.states and vane in model.outputs
-            gust = measured and trim.known and evenly
-            method = GUST if gust else "output-error-white"
-            if method != GUST and self.template == "lateral":
-                model = without_attitude(model, used)
-        return model, method, remarks
-
-
-def _simulated(
-    frozen: LinearModel, maneuvers: Sequence[Maneuver], at_trim: Sequence[Maneuver]
-) -> list[Array]:
-    """Return a free simulation, constants fitted at the trim, with the departures from it."""
-    return [
-        y + m.outputs - still.outputs
-        for y, m, still in zip(free_simulation(frozen, at_trim), maneuvers, at_trim, strict=True)
-    ]
-
-
-def _without_delays(
-    maneuver: Maneuver,
-    model: LinearModel,
-    groups: tuple[DelayGroup, ...],
-    delays: Mapping[str, tuple[float, float]],
-) -> Maneuver:
-    if not delays:
-        return maneuver
-    late = replace(model, delays=groups)
-    return advance_outputs(maneuver, late, {name: value for name, (value, _) in delays.items()})
 
 
 def maneuvers_of(columns: Mapping[str, Array]) -> list[tuple[DetectedManeuver, Grade]]:
@@ -599,29 +340,3 @@ def identify(
 def from_zero(coefficient: Coefficient) -> bool:
     """Return whether a coefficient is told from zero: its interval does not reach it."""
     return abs(coefficient.value) > coefficient.half_width
-
-
-def _maneuver_columns(used: Sequence[FlownManeuver]) -> dict[str, Array]:
-    """Return the corrected columns within the maneuvers, every sample once."""
-    kept: dict[str, list[Array]] = {}
-    flights = list({id(m.flight): m.flight for m in used}.values())
-    for flight in flights:
-        t = flight.corrected["t_s"]
-        cut = np.zeros(len(t), dtype=bool)
-        for m in used:
-            if m.flight is flight:
-                cut |= (t >= m.found.start_s) & (t <= m.found.end_s)
-        for name, values in flight.corrected.items():
-            if name != "t_s":
-                kept.setdefault(name, []).append(values[cut])
-    return {k: np.concatenate(v) for k, v in kept.items() if len(v) == len(flights)}
-
-
-def _held_out(found: list[FlownManeuver]) -> list[FlownManeuver]:
-    """Hold out the last maneuver of every axis that was flown at least three times."""
-    held = []
-    for axis in dict.fromkeys(m.found.axis for m in found):
-        mine = [m for m in found if m.found.axis == axis]
-        if len(mine) >= HELD_OUT_FROM:
-            held.append(mine[-1])
-    return held

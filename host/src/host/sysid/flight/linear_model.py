@@ -10,10 +10,11 @@ import numpy as np
 from host.instrument.deviations import SensorErrorModel, deviations, unknown_sensors
 from host.sysid.compatibility.path_preparation import NO_OFFSETS
 from host.sysid.estimators.start_values import regression_estimates
+from host.sysid.flight.filter_step import feels_roll, rolling_gust_identifiable
 from host.sysid.flight.hidden_angles import without_vanes
 from host.sysid.flight.reconstructed_flight import FlownManeuver
 from host.sysid.identification_error import IdentificationError
-from host.sysid.models.residual_delays import STANDARD_DELAYS
+from host.sysid.models.residual_delays import STANDARD_DELAYS, without_standard_delays
 from host.sysid.models.state_space_model import (
     LinearModel,
     without_inputs,
@@ -46,6 +47,61 @@ STAGED = {
     " aircraft file (default)",
     GUST: "filter error with the gust as a state, delays estimated beside it",
 }
+
+
+def model_and_method(
+    used: Sequence[FlownManeuver],
+    trim: Trim,
+    template_name: str,
+    method: str,
+    own: LinearModel | None,
+) -> tuple[LinearModel, str, tuple[str, ...]]:
+    """Return the model to fit, the method that the default one comes to, and remarks.
+
+    Parameters
+    ----------
+    used : sequence of FlownManeuver
+        Those of the fit.
+    trim : Trim
+    template_name : str
+    method : str
+        As asked for.
+    own : LinearModel or None
+        The user's own, in place of the template.
+
+    Raises
+    ------
+    IdentificationError
+        If the method needs an airspeed that is not known.
+    """
+    if method == GUST and own is None and not trim.known:
+        raise IdentificationError(
+            f"{GUST} needs airspeed_mps, which tells how fast gusts pass; give another method"
+        )
+    flight = used[0].flight
+    free = frees_places(method)
+    able = free and all(m.flight.delays_open for m in used)
+    remarks: tuple[str, ...] = ()
+    if own is None:
+        shared = set.intersection(*(set(m.flight.corrected) for m in used))
+        model, remarks = fitted_template(shared, template_name, used, trim, method, able=able)
+    else:
+        model = own if able else without_standard_delays(own)
+    instrument = None if flight.compatibility is None else flight.compatibility.instrument
+    if own is None and instrument is not None and free:
+        model = with_drag_arm(model, trim, instrument)
+    if method == DEFAULT_METHOD and own is None:
+        # A filter takes the line between two values of a slow sensor for measurements.
+        evenly = not any(m.cut(model).held for m in used)
+        # Of our own log laterally only where its sensors are known (`filter_step`).
+        rolls = feels_roll(model) and rolling_gust_identifiable(used)
+        vane = "beta_rad" if rolls else "alpha_rad"
+        measured = vane in model.states and vane in model.outputs
+        gust = measured and trim.known and evenly
+        method = GUST if gust else "output-error-white"
+        if method != GUST and template_name == "lateral":
+            model = without_attitude(model, used)
+    return model, method, remarks
 
 
 def template_at(

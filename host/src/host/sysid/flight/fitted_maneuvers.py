@@ -1,0 +1,98 @@
+"""Which maneuvers a linear model is fitted to, and which of them are held out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from host.arrays import Array
+from host.sysid.flight.maneuver_detection import grade
+from host.sysid.flight.maneuver_selection import HELD_OUT_FROM, joined_windows
+from host.sysid.flight.reconstructed_flight import (
+    FlownManeuver,
+    ReconstructedFlight,
+    flown_maneuvers,
+)
+from host.sysid.identification_error import IdentificationError
+
+WEAK_GRADE = 0.2
+
+
+class NoManeuverError(IdentificationError):
+    """No maneuver that a model could be fitted to."""
+
+
+def fitted_and_held_out(
+    flights: Sequence[ReconstructedFlight], axes: Sequence[str], template: str, *, named: bool
+) -> tuple[list[FlownManeuver], list[FlownManeuver]]:
+    """Return the maneuvers to fit and those to hold out.
+
+    Parameters
+    ----------
+    flights : sequence of ReconstructedFlight
+    axes : sequence of str
+        Surfaces whose maneuvers a model is fitted to.
+    template : str
+        What the model is called in messages.
+    named : bool
+        A stretch that was given is one of them, whatever moved more.
+
+    Raises
+    ------
+    NoManeuverError
+        If there is none.
+    """
+    every = [f for flight in flights for f in flight.maneuvers]
+    if not every:
+        raise NoManeuverError(
+            "no maneuver found: no surface moved by more than 1.4 degrees at once; give"
+            " argument from_s and argument to_s, or fly a doublet or 3-2-1-1 of 3 degrees or"
+            " more"
+        )
+    mine = flown_maneuvers(
+        flights,
+        joined_windows(
+            [[f for f in x.maneuvers if f.axis in axes or (f.given and named)] for x in flights]
+        ),
+    )
+    # The order in which flights are given shall not choose the maneuver that is held out.
+    mine.sort(key=lambda m: [(f.start_s, f.end_s, f.amplitude) for f in m.flight.maneuvers])
+    if not mine:
+        given = "; argument models names it all the same" if every[0].given else ""
+        raise NoManeuverError(
+            f"no maneuver of {', '.join(axes)} for {template}; found"
+            f" only {', '.join(sorted({f.axis for f in every}))}{given}"
+        )
+    good = [
+        m for m in mine if m.found.given or grade(m.flight.corrected, m.found).score >= WEAK_GRADE
+    ] or mine
+    held = _held_out([m for m in good if not m.found.given])
+    return [m for m in good if m not in held], [replace(m, found=m.found.response()) for m in held]
+
+
+def columns_of(used: Sequence[FlownManeuver]) -> dict[str, Array]:
+    """Return the corrected columns within the maneuvers, every sample once."""
+    kept: dict[str, list[Array]] = {}
+    flights = list({id(m.flight): m.flight for m in used}.values())
+    for flight in flights:
+        t = flight.corrected["t_s"]
+        cut = np.zeros(len(t), dtype=bool)
+        for m in used:
+            if m.flight is flight:
+                cut |= (t >= m.found.start_s) & (t <= m.found.end_s)
+        for name, values in flight.corrected.items():
+            if name != "t_s":
+                kept.setdefault(name, []).append(values[cut])
+    return {k: np.concatenate(v) for k, v in kept.items() if len(v) == len(flights)}
+
+
+def _held_out(found: list[FlownManeuver]) -> list[FlownManeuver]:
+    """Hold out the last maneuver of every axis that was flown at least three times."""
+    held = []
+    for axis in dict.fromkeys(m.found.axis for m in found):
+        mine = [m for m in found if m.found.axis == axis]
+        if len(mine) >= HELD_OUT_FROM:
+            held.append(mine[-1])
+    return held

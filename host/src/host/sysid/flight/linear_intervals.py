@@ -1,0 +1,127 @@
+"""Intervals of a linear model: noise and repeats, then every systematic error."""
+
+from __future__ import annotations
+
+from host.aircraft.mass_properties import AirframeData
+from host.aircraft.powerplant import Powerplant
+from host.instrument.deviations import airspeed_share
+from host.instrument.instrument_errors import usual_errors
+from host.sysid.aerodynamics.coefficient_table import (
+    CoefficientParts,
+    ShiftedEstimate,
+    coefficient_parts,
+)
+from host.sysid.aerodynamics.path_thrust import path_thrust
+from host.sysid.compatibility.sensor_dynamics import IMU_DELAY, SERVO_DELAY
+from host.sysid.estimators.coherence_inflation import inflate_by_coherence, widened_to
+from host.sysid.estimators.gust_penetration import with_unknown_roll_lag
+from host.sysid.estimators.missing_control import missing_control, widened_by_missing_control
+from host.sysid.flight.airspeed_tolerance import airspeed_shift
+from host.sysid.flight.column_noise import with_column_noise
+from host.sysid.flight.filter_step import others_recorded, sensors_known
+from host.sysid.flight.free_simulation import free_responses
+from host.sysid.flight.linear_stages import LinearEstimate, LinearIntervals
+from host.sysid.flight.noise_model_limits import excess_over_noise_model
+from host.sysid.flight.sampling_error import hold_shift, kink_shift
+from host.sysid.flight.systematic_errors import add_systematic_covariance, systematic_error_shifts
+from host.sysid.models.fit_result import FitResult
+from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
+from host.sysid.numerics.maneuver_agreement import inflate_covariance, maneuver_agreement
+from host.sysid.numerics.score_variance import white_fit_variance
+
+WHITE = "output error (white)"  # its noise is judged beside what the inputs drive
+
+
+def linear_intervals(
+    estimate: LinearEstimate,
+    airframe: AirframeData | None,
+    powerplant: Powerplant | None,
+    *,
+    own: bool,
+) -> LinearIntervals:
+    """Return the covariance from noise and repeats, and from every systematic error.
+
+    Parameters
+    ----------
+    estimate : LinearEstimate
+    airframe : AirframeData or None
+        Gives coefficients.
+    powerplant : Powerplant or None
+        Gives the thrust that turns with the aircraft.
+    own : bool
+        The model is one of the user's own.
+    """
+    e = estimate
+    statistical, coherence = _of_noise(e)
+    shifts = _shifts(e, statistical, airframe, own=own)
+    found: CoefficientParts | None = None
+    if airframe is not None and e.trim.known:
+        instrument = e.used[0].flight.instrument
+        errors = None if instrument is None else instrument.errors
+        thrust = path_thrust(e.cuts, powerplant, airframe, e.trim, e.condition)
+        found = coefficient_parts(statistical, airframe, e.condition, shifts, errors, thrust)
+    return LinearIntervals(
+        statistical, coherence, shifts, add_systematic_covariance(statistical, shifts), found
+    )
+
+
+def _of_noise(e: LinearEstimate) -> tuple[FitResult, InputCoherence | None]:
+    """Return the result at the trim, noise, repeats and what inputs drive in its covariance."""
+    statistical = e.fit if e.departure is None else e.departure.corrected(e.fit)
+    # Airspeed that varied is known: what it does is no model error.
+    at_trim = e.at_trim(e.estimate)
+    free = free_responses(e.model, e.estimate, at_trim)
+    coherence = excess = None
+    if free is not None:
+        coherence = input_coherence(free.problem, free.responses, free.theta)
+        excess = excess_over_noise_model(free, statistical, e.trim.airspeed_mps)
+        # Before maneuvers are compared: by noise without memory a gust made them disagree.
+        if statistical.method == WHITE:
+            statistical = widened_to(
+                statistical,
+                white_fit_variance(
+                    free.problem,
+                    free.responses,
+                    coherence.noise,
+                    coherence.innovation_variance,
+                ),
+            )
+    statistical = with_column_noise(statistical, e.maneuvers, e.trim)
+    noisy = statistical if e.departure is None else e.departure.with_airspeed_noise(statistical)
+    statistical = inflate_covariance(statistical, maneuver_agreement(noisy))
+    statistical = inflate_by_coherence(statistical, coherence, excess)
+    absent = missing_control(e.fit, at_trim, e.trim.airspeed_mps)
+    statistical = widened_by_missing_control(statistical, absent)
+    # Behind what a model error multiplies: this noise is known.
+    if e.departure is not None:
+        statistical = e.departure.with_airspeed_noise(statistical)
+    # Our own log is fitted in means, which lean less on what the gust is between samples.
+    if others_recorded(e.used):
+        statistical = with_unknown_roll_lag(statistical)
+    return statistical, coherence
+
+
+def _shifts(
+    e: LinearEstimate, statistical: FitResult, airframe: AirframeData | None, *, own: bool
+) -> tuple[ShiftedEstimate, ...]:
+    """Return the estimate moved by one deviation of every systematic error."""
+    shifts: tuple[ShiftedEstimate, ...] = () if e.departure is None else e.departure.remainders
+    carriers = [m.flight.compatibility for m in e.used]
+    known = [c for c in carriers if c is not None]
+    if len(known) == len(carriers):
+        moved = systematic_error_shifts(statistical, e.maneuvers, e.cuts, known, e.trim)
+        # Of servos that were estimated the covariance has what they leave open, and the IMU's
+        # delay with it: all outputs later are all inputs earlier.
+        estimated = () if e.servo is None else (SERVO_DELAY, IMU_DELAY)
+        shifts += tuple(s for s in moved if s.error not in estimated)
+    if airframe is None:
+        first = e.used[0].flight
+        usual = first.errors or usual_errors(first.maker)
+        share = airspeed_share(usual, e.condition.qbar_pa)
+        shifts += airspeed_shift(statistical, e.maneuvers, e.trim, share)
+    # Delays that were estimated have taken up half a sample, and their intervals count it.
+    if not own and sensors_known(e.used):
+        shifts += kink_shift(statistical, e.maneuvers, e.used, e.trim)
+    elif own or not e.delays:
+        shifts += hold_shift(statistical, e.maneuvers, e.trim)
+    return shifts

@@ -1,0 +1,82 @@
+"""Free simulation of a linear model over the maneuvers fitted and those held out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from host.arrays import Array
+from host.sysid.estimators.gust_delays import advance_outputs
+from host.sysid.flight.free_simulation import fits_of, free_simulation, frozen_model
+from host.sysid.flight.linear_stages import LinearEstimate, LinearIntervals, LinearValidation
+from host.sysid.flight.prediction_limits import Prediction, driven_states, predictions
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.residual_delays import delays_of
+from host.sysid.models.state_space_model import DelayGroup, LinearModel
+
+
+def linear_validation(
+    estimate: LinearEstimate, intervals: LinearIntervals, own: LinearModel | None
+) -> LinearValidation:
+    """Simulate the model freely over the maneuvers fitted and those held out.
+
+    Parameters
+    ----------
+    estimate : LinearEstimate
+    intervals : LinearIntervals
+    own : LinearModel or None
+        The user's own, whose delays stand in it.
+    """
+    e, total = estimate, intervals.total
+    # Of frequencies the residuals are not those of samples.
+    ours = total.residual_kind == "output" and all(
+        y.shape == m.outputs.shape for y, m in zip(total.fitted, e.maneuvers, strict=True)
+    )
+    same = ours and not intervals.shifts
+    frozen = frozen_model(e.model, total)
+    simulated = (
+        list(total.fitted) if same else _simulated(frozen, e.maneuvers, e.at_trim(total.estimate))
+    )
+    late = delays_of(e.model.outputs) if own is None else own.delays
+    held_out = [_without_delays(m.cut(e.model), e.model, late, e.delays) for m in e.held_out]
+    at_trim = (
+        held_out
+        if e.departure is None
+        else e.departure.removed_from_held_out(
+            held_out, [m.departing() for m in e.held_out], total.estimate
+        )
+    )
+    held_out_runs = _simulated(frozen, held_out, at_trim)
+    explained: dict[str, Prediction] = {}
+    if driven_states(e.model, total):
+        explained = predictions(e.model, total, intervals.coherence, e.maneuvers, simulated)
+    return LinearValidation(
+        tuple(simulated),
+        fits_of(e.model, e.maneuvers, simulated),
+        fits_of(e.model, held_out, held_out_runs),
+        predictions(e.model, total, intervals.coherence, held_out, held_out_runs),
+        tuple(zip(held_out, held_out_runs, strict=True)),
+        explained,
+    )
+
+
+def _simulated(
+    frozen: LinearModel, maneuvers: Sequence[Maneuver], at_trim: Sequence[Maneuver]
+) -> list[Array]:
+    """Return a free simulation, constants fitted at the trim, with the departures from it."""
+    return [
+        y + m.outputs - still.outputs
+        for y, m, still in zip(free_simulation(frozen, at_trim), maneuvers, at_trim, strict=True)
+    ]
+
+
+def _without_delays(
+    maneuver: Maneuver,
+    model: LinearModel,
+    groups: tuple[DelayGroup, ...],
+    delays: Mapping[str, tuple[float, float]],
+) -> Maneuver:
+    if not delays:
+        return maneuver
+    late = replace(model, delays=groups)
+    return advance_outputs(maneuver, late, {name: value for name, (value, _) in delays.items()})
