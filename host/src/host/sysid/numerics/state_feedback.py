@@ -27,6 +27,7 @@ LAGS_S = (0.0, 0.1, 0.3)  # shorter ones are a delay
 WASHOUTS_S = (np.inf, 4.0, 2.0, 1.0, 0.5)
 WORTH = 0.7  # of what is left unexplained: a further signal must leave no more
 FILTER_WORTH = 0.5  # the same of a filter
+TOGETHER_WORTH = 0.25  # the same of several signals at once
 MOST_SIGNALS = 4
 HOPELESS = 0.4  # R2 of all signals at their best delay, without a filter
 FEEDBACK_R2 = 0.9  # R2 from which an input is a function of the signals
@@ -169,7 +170,12 @@ class _Record:
 
 
 def _simplest(record: _Record, delays_s: Mapping[Shape, Array], least_r2: float = 0.0) -> _Found:
-    """Return as few signals and as simple a filter as explain the input, by forward selection."""
+    """Return as few signals and as simple a filter as explain the input.
+
+    One signal after the other is added while it is worth it. A law of several may need them all at
+    once (heading, bank and roll rate of an autopilot): where all together explain far more, those
+    that are not worth it are left out one by one.
+    """
     products = {shape: record.products(shape, own) for shape, own in delays_s.items()}
     best = _Found()
     count = record.values.shape[1]
@@ -180,6 +186,21 @@ def _simplest(record: _Record, delays_s: Mapping[Shape, Array], least_r2: float 
         tried = [_best(products, delays_s, (*best.signals, k)) for k in rest]
         found = max(tried, key=lambda f: f.r2)
         if 1.0 - found.r2 > WORTH * (1.0 - best.r2):
+            break
+        best = found
+    fewer = _eliminated(products, delays_s, tuple(range(count)))
+    return fewer if 1.0 - fewer.r2 < TOGETHER_WORTH * (1.0 - best.r2) else best
+
+
+def _eliminated(
+    products: Mapping[Shape, Array], delays_s: Mapping[Shape, Array], columns: tuple[int, ...]
+) -> _Found:
+    """Return what is left of some signals by backward elimination."""
+    best = _best(products, delays_s, columns)
+    while len(best.signals) > 1:
+        left = (tuple(c for c in best.signals if c != k) for k in best.signals)
+        found = max((_best(products, delays_s, some) for some in left), key=lambda f: f.r2)
+        if len(best.signals) <= MOST_SIGNALS and 1.0 - best.r2 < WORTH * (1.0 - found.r2):
             break
         best = found
     return best
