@@ -14,6 +14,7 @@ from host.sysid.flight.flight_tables import read_columns
 from host.sysid.identification_error import IdentificationError
 from host.twin.virtual import virtual_flight
 from scipy.signal import lsim
+from studies.foreign.flight import Air, derivatives, fly
 
 import host
 
@@ -222,3 +223,15 @@ noise = { alpha_rad = 2e-4, q_radps = 2e-4 }
     ) in text
     assert '"bias_rate.q_radps": 4.8' in found.to_json()
     assert "constants of each maneuver" not in text
+
+
+@pytest.mark.parametrize("model", ["longitudinal", "short-period"])
+def test_without_accelerations_a_gust_is_no_delay_of_the_vane(model: str) -> None:
+    """A vane seemed 14 ms early, known to 5, and M_q was 12 % off, known to 7."""
+    columns = ("t_s", "airspeed_mps", "alpha_rad", "q_radps", "theta_rad", "elevator_rad")
+    measured, _ = fly(Air(intensity_mps=0.3, spread=True), 17025)
+    [answer] = host.identify(pd.DataFrame({k: measured[k] for k in columns}), models=model).linear
+    true, half = derivatives(answer.trim.airspeed_mps), answer.result.half_width()
+    for name in ("Z_alpha", "M_alpha", "M_q"):
+        k = answer.result.index(name)
+        assert abs(answer.result.estimate[k] - true[name]) < half[k], name
