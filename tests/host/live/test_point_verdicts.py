@@ -237,7 +237,7 @@ def test_a_point_is_estimated_from_the_last_seconds_and_judged_by_both(
 ) -> None:
     wanted = card.segments[1]
     rows = flown(response, [(START_S, wanted)])
-    by = Pretended(estimate_of(wanted, 1.6))
+    by = Pretended(estimate_of(wanted, 1.75))
     watch = watched(card, rows, estimates=by)
     said = only(watch)
     assert (said["good"], said["estimated"]) == (False, True)
