@@ -59,6 +59,8 @@ class OutputProblem:
     ----------
     least_variance : Array, shape (p,)
         Below it an estimated noise variance is rounding error, or that of the numbers' step.
+    clean_variance : Array, shape (p,)
+        The same without the numbers' step: below it is no noise of a sensor.
     known_variance : Array, shape (p,)
         Of the noise of outputs for which the model states it; NaN where it is estimated.
     counts : Array, shape (p,)
@@ -155,7 +157,8 @@ class OutputProblem:
         power = np.mean(np.square(self._parts[0].measured), axis=1)
         self.least_variance = 1e-20 * np.maximum(power, 1e-30)  # of an output that fits perfectly
         spread = np.var(np.hstack([part.measured for part in self._parts]), axis=1)
-        self.least_variance = np.maximum(self.least_variance, CLEAN_SHARE**2 * spread)
+        self.clean_variance = np.maximum(self.least_variance, CLEAN_SHARE**2 * spread)
+        self.least_variance = self.clean_variance
         noise = dict(model.known_noise)
         self.known_variance = np.array([noise.get(y, np.nan) ** 2 for y in model.outputs])
         # A uniform step is noise of variance step^2 / 12 (Widrow & Kollar, Quantization Noise).
