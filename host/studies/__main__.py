@@ -139,7 +139,8 @@ def study_h(stem: Path, size: int) -> list[Path]:
 
     seeds = range(windows.FIRST_SEED, windows.FIRST_SEED + WINDOW_SEEDS[size])
     flights = range(windows.FIRST_FLIGHT, windows.FIRST_FLIGHT + CARD_SEEDS[size])
-    cases = list(windows.study(stem.with_suffix(".jsonl"), seeds, windows.CARDS, flights))
+    cards = windows.CARDS[:1]  # all eight take a minute a seed
+    cases = list(windows.study(stem.with_suffix(".jsonl"), seeds, cards, flights))
     return write(tables.windows_table(cases), windows_figure(cases), stem)
 
 

@@ -3,8 +3,8 @@
 Linear records first: NAVION with gravity and constants free, and the Ultra Stick 25e sideways, in
 white noise, inputs, then hands off. Detection sees the surfaces. The same model is fitted to the
 windows and to the whole record; the bound is that of the whole record with the noise known. Then
-cards of the twin, by the answer that the verb gives. Every finished flight is a line of a file: a
-run that was broken off goes on behind it.
+cards of the twin through the recorder, every tolerance drawn, by the answer that the verb gives.
+Every finished flight is a line of a file: a run that was broken off goes on behind it.
 """
 
 from __future__ import annotations
@@ -43,7 +43,6 @@ from studies.flights import PRINCIPAL
 from studies.gusts import NOISE, gusty_aircraft
 from studies.inputs import LEAD_S, steps
 
-AIRCRAFT = "ultrastick25e"
 SNR = 10.0
 FIRST_SEED = 6000  # 100 to 129 and 5000 to 5049 were looked at while detection was written
 FIRST_FLIGHT = 5000  # of cards; 200 to 207 were looked at
@@ -51,7 +50,9 @@ AXES = ("longitudinal", "lateral")
 ALONG = ("CL", "CD", "Cm")
 DERIVATIVES = tuple(name for name in PRINCIPAL if name != "CD_0")
 LIMIT_WHOLE, LIMIT_BOUND = 1.15, 1.3
-CARDS = ("demo",)
+CARDS = (
+    "demo", "calm", "mixed", "multisine", "survey", "sweep", "thesis_flight1", "thesis_flight2",
+)  # fmt: skip
 SETTLED_S = 3.0  # after the launch of a card
 Row = dict[str, Any]
 
@@ -195,10 +196,11 @@ def _judged(
 
 def twin_row(card: str, seed: int) -> Row:
     """Fly a card, answer from the windows and from the whole flight; errors over the truth."""
-    flight = virtual_flight(card, seed, chain="none")
+    flight = virtual_flight(card, seed)
+    aircraft = flight.record.aircraft.name
     columns, _ = even_columns(flight.table)
-    airframe = airframe_data(AIRCRAFT)
-    checked = reconstruct(columns, airframe, sensor_error_model(AIRCRAFT))
+    airframe = airframe_data(aircraft)
+    checked = reconstruct(columns, airframe, sensor_error_model(aircraft))
     t, speed = columns["t_s"], columns["airspeed_mps"]
     up = t[speed > FLYING_SHARE * float(np.median(speed))]
     whole = select_maneuvers(columns, stretches=[(float(up[0]) + SETTLED_S, float(up[-1]))])
@@ -214,7 +216,7 @@ def twin_row(card: str, seed: int) -> Row:
             try:
                 [answer] = identify(
                     columns, names=(axis,), airframe=airframe, windows=windows,
-                    compatibility=checked, powerplant=powerplant(AIRCRAFT),
+                    compatibility=checked, powerplant=powerplant(aircraft),
                 )  # fmt: skip
             except IdentificationError:
                 row[label] += [None] * len(names)
@@ -291,7 +293,7 @@ def stored_rows(path: Path, label: str, seeds: range, make: Callable[[int], Row]
 
 def study(path: Path, seeds: range, cards: Sequence[str], card_seeds: range) -> Iterator[Compared]:
     """Yield every case as it is done."""
-    for case in CASES:
+    for case in CASES if len(seeds) else ():
         rows = stored_rows(path, case.label, seeds, partial(linear_row, case))
         yield compared(case.label, rows)
     for card in cards:
@@ -317,11 +319,15 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rows", type=Path, default=Path("windows.jsonl"))
     parser.add_argument("--flights", type=int, default=50, help="seeds of every linear record")
+    parser.add_argument("--first", type=int, default=FIRST_SEED, help="first of them")
     parser.add_argument("--card-flights", type=int, default=0, help="seeds of every card")
+    parser.add_argument("--first-flight", type=int, default=FIRST_FLIGHT, help="first of them")
+    parser.add_argument("--card", choices=CARDS, action="append", help="this card, not all")
     options = parser.parse_args(arguments)
-    seeds = range(FIRST_SEED, FIRST_SEED + options.flights)
-    flights = range(FIRST_FLIGHT, FIRST_FLIGHT + options.card_flights)
-    for case in study(options.rows, seeds, CARDS if len(flights) else (), flights):
+    seeds = range(options.first, options.first + options.flights)
+    flights = range(options.first_flight, options.first_flight + options.card_flights)
+    cards = (options.card or CARDS) if len(flights) else ()
+    for case in study(options.rows, seeds, cards, flights):
         sys.stdout.write(line(case) + "\n")
         sys.stdout.flush()
     return 0
