@@ -37,7 +37,9 @@ NOISE = {
     "airspeed_mps": 0.1, "alpha_rad": 0.003, "theta_rad": 0.003, "q_radps": 0.006,
     "ax_mps2": 0.1, "az_mps2": 0.2,
 }  # fmt: skip
-TRUTH = (0.12, 4.1, 8.0, 0.5, 0.05, 0.09, 0.01, -0.8, -9.0, -1.0, 1.0)  # the last turns no calm air
+TRUTH = (  # the last turns no calm air
+    0.12, 4.1, 8.0, 0.5, 0.05, 0.09, 0.02, 0.01, -0.8, -1.0, -9.0, -1.0, 1.0,
+)  # fmt: skip
 START = (17.0, 0.1, 0.1, 0.0)
 RESPOND = "--respond"
 
@@ -66,15 +68,17 @@ def record(model: NonlinearModel) -> Maneuver:
 
 def by_hand(theta: Array, inputs: Array) -> Array:
     """Return the outputs, (samples, 6), as numpy and scipy compute them."""
-    m, iyy, area, chord, rho, g = 1.943, 0.0722, 0.32, 0.25, 1.225, GRAVITY_MPS2
-    CL_0, CL_alpha, CL_q, CL_de, CD_0, induced, Cm_0, Cm_alpha, Cm_q, Cm_de = theta[:10]
+    m, iyy, area, chord, rho, g, ref = 1.943, 0.0722, 0.32, 0.25, 1.225, GRAVITY_MPS2, 0.1
+    CL_0, CL_alpha, CL_q, CL_de, CD_0, induced, CD_de = theta[:7]
+    Cm_0, Cm_alpha, Cm_alpha2, Cm_q, Cm_de = theta[7:12]
     t = np.arange(len(inputs)) * DT_S
 
     def coefficients(V: Array, alpha: Array, q: Array, de: Array) -> tuple[Array, ...]:
         qhat = q * chord / (2.0 * V)
         steady = CL_0 + CL_alpha * alpha + CL_de * de
-        Cm = Cm_0 + Cm_alpha * alpha + Cm_q * qhat + Cm_de * de
-        return steady + CL_q * qhat, CD_0 + induced * steady**2, Cm, 0.5 * rho * V**2 * area
+        CD = CD_0 + induced * steady**2 + CD_de * de
+        Cm = Cm_0 + Cm_alpha * alpha + Cm_alpha2 * (alpha - ref) ** 2 + Cm_q * qhat + Cm_de * de
+        return steady + CL_q * qhat, CD, Cm, 0.5 * rho * V**2 * area
 
     def rates(time_s: float, x: Array) -> Array:
         V, alpha, attitude, q = x
@@ -91,13 +95,13 @@ def by_hand(theta: Array, inputs: Array) -> Array:
         )
 
     found = integrate.solve_ivp(
-        rates, (0.0, t[-1]), theta[11:15], t_eval=t, max_step=DT_S, rtol=1e-10, atol=1e-12
+        rates, (0.0, t[-1]), theta[13:17], t_eval=t, max_step=DT_S, rtol=1e-10, atol=1e-12
     )
     V, alpha, attitude, q = found.y
     CL, CD, _, q_ms = coefficients(V, alpha, q, inputs[:, 0])
     ax = (inputs[:, 1] - q_ms * (CD * np.cos(alpha) - CL * np.sin(alpha))) / m
     az = -q_ms * (CD * np.sin(alpha) + CL * np.cos(alpha)) / m
-    bias_q, bias_x, bias_z = theta[15:]
+    bias_q, bias_x, bias_z = theta[17:]
     return np.column_stack([V, alpha, attitude, q + bias_q, ax + bias_x, az + bias_z])
 
 
