@@ -19,7 +19,7 @@ from host.fleet.statistics.spread_intervals import KnownSpreads, TypeEffect, typ
 from host.fleet.statistics.variance_components import FleetEstimates
 from scipy import special
 
-from studies.stored_rows import flown_rows
+from studies.stored_rows import flown_rows, rows_file
 
 FIRST_SEED = 20_000
 AIRCRAFT = (5, 8, 12, 50)
@@ -149,7 +149,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m studies.fleet_truth", description=__doc__)
     parser.add_argument("--fleets", type=int, default=500, metavar="N", help="of each cell")
     parser.add_argument("--first", type=int, default=FIRST_SEED, metavar="SEED")
-    parser.add_argument("--rows", type=Path, default=Path("../build/study/fleet_truth.csv"))
+    parser.add_argument("--rows", type=rows_file, default=Path("../build/study/fleet_truth.csv"))
     args = parser.parse_args(arguments)
     named = {cell.name: cell for cell in cells()}
     seeds = range(args.first, args.first + args.fleets)

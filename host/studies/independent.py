@@ -33,7 +33,7 @@ from studies.foreign.instrument import (
     drawn_file,
     with_sensor_errors,
 )
-from studies.stored_rows import flown_rows
+from studies.stored_rows import flown_rows, rows_file
 
 # 0-5 were looked at while delays and turning air were written.
 FIRST_SEED = 100
@@ -190,7 +190,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--axis", choices=tuple(NAMES), default="longitudinal")
     parser.add_argument("--analysis", choices=(DIMENSIONAL, WITH_FILE, DIRECT), default=DIMENSIONAL)
     parser.add_argument(
-        "--rows", type=Path, help="of a run that goes on; a file for each axis and analysis"
+        "--rows", type=rows_file, help="of a run that goes on; a file for each axis and analysis"
     )
     options = parser.parse_args(arguments)
     named = "" if options.analysis == DIMENSIONAL else f"_{options.analysis}"

@@ -33,6 +33,7 @@ from host.twin.testcard.cards import Card, load
 from host.twin.virtual import VirtualFlight, virtual_flight
 
 from studies.coefficients import truths
+from studies.stored_rows import rows_file
 
 AIRCRAFT = "ultrastick25e"
 FIRST_SEED = 10_900  # 7000-7023 were looked at while this was written
@@ -175,7 +176,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
     parser.add_argument("--card", default="survey")
     parser.add_argument(
-        "--rows", type=Path, default=Path("../build/study/instrument_honesty.jsonl")
+        "--rows", type=rows_file, default=Path("../build/study/instrument_honesty.jsonl")
     )
     options = parser.parse_args(arguments)
     options.rows.parent.mkdir(parents=True, exist_ok=True)

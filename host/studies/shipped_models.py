@@ -31,7 +31,7 @@ from host.twin.testcard.cards import Card, load
 from host.twin.virtual import VirtualFlight, virtual_flight
 
 import host
-from studies.stored_rows import flown_rows
+from studies.stored_rows import flown_rows, rows_file
 
 FIRST_SEED = 14650
 AIRCRAFT = "ultrastick25e"
@@ -195,7 +195,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--models", nargs="+", choices=MODELS, default=list(MODELS))
     parser.add_argument("--airs", nargs="+", type=float, choices=AIRS_MPS, default=list(AIRS_MPS))
     parser.add_argument("--method", help="in place of the default")
-    parser.add_argument("--rows", type=Path, default=Path("../build/study/shipped_models.csv"))
+    parser.add_argument("--rows", type=rows_file, default=Path("../build/study/shipped_models.csv"))
     options = parser.parse_args(arguments)
     seeds = range(options.first, options.first + options.flights)
     keys = ((m, air, seed) for seed in seeds for air in options.airs for m in options.models)

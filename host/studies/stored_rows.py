@@ -30,6 +30,20 @@ class SeededRun:
         return 0
 
 
+def rows_file(text: str) -> Path:
+    """Return where rows are kept; argparse says so in one line where that is a folder.
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        A folder was named.
+    """
+    path = Path(text)
+    if path.is_dir():
+        raise argparse.ArgumentTypeError(f"{text} is a folder; name a file in it")
+    return path
+
+
 def seeded_run(
     name: str,
     about: str | None,
@@ -57,7 +71,7 @@ def seeded_run(
     parser = argparse.ArgumentParser(prog=f"python -m studies.{name}", description=about)
     parser.add_argument("--flights", type=int, default=flights, help=each)
     parser.add_argument("--first", type=int, default=first_seed, help="first seed")
-    parser.add_argument("--rows", type=Path, default=Path(f"../build/study/{name}.csv"))
+    parser.add_argument("--rows", type=rows_file, default=Path(f"../build/study/{name}.csv"))
     asked = parser.parse_args(arguments)
     return SeededRun(range(asked.first, asked.first + asked.flights), asked.rows)
 

@@ -42,6 +42,7 @@ from studies.aircraft import navion_structured
 from studies.flights import PRINCIPAL
 from studies.gusts import NOISE, gusty_aircraft
 from studies.inputs import LEAD_S, steps
+from studies.stored_rows import rows_file
 
 SNR = 10.0
 FIRST_SEED = 6000  # 100 to 129 and 5000 to 5049 were looked at while detection was written
@@ -317,7 +318,7 @@ def line(case: Compared) -> str:
 def main(arguments: list[str] | None = None) -> int:
     """Print a line per case; `--rows` keeps finished flights."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rows", type=Path, default=Path("windows.jsonl"))
+    parser.add_argument("--rows", type=rows_file, default=Path("windows.jsonl"))
     parser.add_argument("--flights", type=int, default=50, help="seeds of every linear record")
     parser.add_argument("--first", type=int, default=FIRST_SEED, help="first of them")
     parser.add_argument("--card-flights", type=int, default=0, help="seeds of every card")

@@ -43,3 +43,13 @@ def test_a_table_is_of_the_seeds_that_were_asked_for(capsys: pytest.CaptureFixtu
     assert capsys.readouterr().out == "7\n8\n"
     usual = seeded_run("mine", None, [], flights=50, first_seed=1)
     assert (usual.seeds, usual.rows) == (range(1, 51), Path("../build/study/mine.csv"))
+
+
+def test_a_folder_in_place_of_the_file_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--rows", str(tmp_path)]
+    with pytest.raises(SystemExit) as stopped:
+        seeded_run("mine", "About it.", words, flights=50, first_seed=1)
+    assert stopped.value.code == 2
+    assert "is a folder; name a file in it" in capsys.readouterr().err
