@@ -81,6 +81,25 @@ def test_two_signals_are_named() -> None:
     assert "N_dr, N_r and N_p cannot be told apart" in found.text
 
 
+@pytest.mark.parametrize("seed", [17718, 17719])
+def test_a_bank_loop_whose_command_jumps_is_named_and_takes_nothing(seed: int) -> None:
+    """The command is no column, and a single constant leaves it no law."""
+    steps = np.repeat(np.random.default_rng(seed).uniform(-0.2, 0.2, 8), SAMPLES // 8)
+    inputs = {
+        "aileron_rad": steps,
+        "rudder_rad": doublets(SAMPLES, tuple(s + 50 for s in STARTS), 0.3, 0.1),
+    }
+    law = Law("aileron_rad", {"phi_rad": -0.5, "p_radps": -0.06})
+    [found] = found_in(flown("lateral", inputs, law, seed))
+    assert found.text.startswith("aileron_rad follows phi_rad and p_radps at ")
+    assert found.text.endswith(" legs of constant command")
+    assert found.feedback is None
+    assert "derivatives are told all the same" in found.done
+    # The same steps by a pilot, small enough for a flight without a law.
+    inputs["aileron_rad"] = 0.1 * steps
+    assert found_in(flown("lateral", inputs, None, seed)) == []
+
+
 @pytest.mark.parametrize("side_s", [0.3, 0.8])
 @pytest.mark.parametrize("seed", [3, 4])
 def test_doublets_of_a_pilot_are_no_feedback(seed: int, side_s: float) -> None:

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from host.arrays import Array
+from host.arrays import Array, IntArray
 from host.sysid.flight.data_finding import Feedback, Finding
 from host.sysid.flight.maneuver_detection import DetectedManeuver, runs_of
 from host.sysid.flight.maneuver_selection import FEWEST
+from host.sysid.numerics.feedback_legs import feedback_legs
 from host.sysid.numerics.state_feedback import FeedbackLaw, feedback_law
 
 LATERAL = ("p_radps", "r_radps", "beta_rad", "phi_rad", "psi_rad")
@@ -27,8 +28,11 @@ ATTITUDE = ("phi_rad", "theta_rad", "psi_rad", "altitude_m")
 HOLDING = {
     ("elevator_rad", "q_radps"): 1, ("elevator_rad", "alpha_rad"): 1,
     ("aileron_rad", "p_radps"): -1, ("aileron_rad", "phi_rad"): -1,
+    ("aileron_rad", "psi_rad"): -1,
     ("rudder_rad", "r_radps"): 1, ("rudder_rad", "beta_rad"): -1,
 }  # fmt: skip
+# What a waypoint tracker's bank loop follows in every leg, and what in some.
+BANK_LOOP, HEADING = ("p_radps", "phi_rad"), "psi_rad"
 MOMENT = {"elevator_rad": "M", "aileron_rad": "L", "rudder_rad": "N"}
 LABEL = {
     "elevator_rad": "de", "aileron_rad": "da", "rudder_rad": "dr", "airspeed_mps": "V",
@@ -62,14 +66,17 @@ def _finding(
     columns: Mapping[str, Array], maneuvers: Sequence[DetectedManeuver], surface: str
 ) -> Finding | None:
     names = [n for n in FOLLOWED[surface] if n in columns]
-    law = _law(columns, maneuvers, surface, names)
+    windows = _windows(columns, maneuvers, surface)
+    law, jumps = _law(columns, windows, surface, names), ""
+    if law is None and surface == "aileron_rad":
+        law, jumps = _tracker(columns, windows)
     if law is None:
         return None
     aerodynamic: FeedbackLaw | None = law
     if set(law.signals) & set(ATTITUDE):
         names = [n for n in names if n not in ATTITUDE]
-        aerodynamic = _law(columns, maneuvers, surface, names)
-    said = f"{surface} {law_words(law)}"
+        aerodynamic = _law(columns, windows, surface, names)
+    said = f"{surface} {law_words(law)}{jumps}"
     causes = CAUSES.get(surface, CAUSES[""])
     if aerodynamic is None:
         done = "no force depends on attitude or height: its derivatives are told all the same"
@@ -92,13 +99,11 @@ def _finding(
     )
 
 
-def _law(
-    columns: Mapping[str, Array],
-    maneuvers: Sequence[DetectedManeuver],
-    surface: str,
-    names: Sequence[str],
-) -> FeedbackLaw | None:
-    t, moved = columns["t_s"], columns[surface]
+def _windows(
+    columns: Mapping[str, Array], maneuvers: Sequence[DetectedManeuver], surface: str
+) -> list[IntArray]:
+    """Return the samples by which a surface is judged; none if it rests there."""
+    t = columns["t_s"]
     axes = (surface, *COUPLED_SURFACES.get(surface, ()))
     inside = np.zeros(len(t), dtype=bool)
     for item in maneuvers:
@@ -107,12 +112,51 @@ def _law(
             inside |= (t >= first) & (t <= last)
     inside &= ~(columns.get("bridged", np.zeros(len(t))) > 0.0)
     windows = [w for w in runs_of(inside) if len(w) >= FEWEST]
-    if not windows or float(np.std(moved[np.concatenate(windows)])) < STILL_RAD:
+    if not windows or float(np.std(columns[surface][np.concatenate(windows)])) < STILL_RAD:
+        return []
+    return windows
+
+
+def _law(
+    columns: Mapping[str, Array], windows: Sequence[IntArray], surface: str, names: Sequence[str]
+) -> FeedbackLaw | None:
+    if not windows:
         return None
-    law = feedback_law(float(t[1] - t[0]), moved, {n: columns[n] for n in names}, windows)
+    signals = {n: columns[n] for n in names}
+    law = feedback_law(_period_s(columns), columns[surface], signals, windows)
     if law is None or HOLDING.get((surface, law.signals[0]), 0) * law.gains[0] < 0.0:
         return None
     return law
+
+
+def _tracker(
+    columns: Mapping[str, Array], windows: Sequence[IntArray]
+) -> tuple[FeedbackLaw | None, str]:
+    """Return the law of ailerons whose command jumps from leg to leg, and that in words.
+
+    Bank is among its signals, and each acts as it does where an aircraft is held: constants of the
+    legs leave little of a pilot's inputs but what the aircraft answers, and that moves the other
+    way.
+    """
+    if not windows or any(name not in columns for name in BANK_LOOP):
+        return None, ""
+    dt_s, moved = _period_s(columns), columns["aileron_rad"]
+    signals = {n: columns[n] for n in BANK_LOOP}
+    inner, heading = np.column_stack(list(signals.values())), columns.get(HEADING)
+    legs, followed = feedback_legs(dt_s, moved, inner, heading, windows)
+    if followed is not None:
+        signals[HEADING] = followed
+    law = feedback_law(dt_s, moved, signals, legs)
+    if law is None or "phi_rad" not in law.signals:
+        return None, ""
+    gains = zip(law.signals, law.gains, strict=True)
+    if any(HOLDING["aileron_rad", name] * gain < 0.0 for name, gain in gains):
+        return None, ""
+    return law, f" within {len(legs)} legs of constant command"
+
+
+def _period_s(columns: Mapping[str, Array]) -> float:
+    return float(columns["t_s"][1] - columns["t_s"][0])
 
 
 def law_words(law: FeedbackLaw) -> str:
