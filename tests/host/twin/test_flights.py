@@ -101,7 +101,9 @@ def test_human_hand_scatters_as_stated_and_a_machine_does_not() -> None:
     # Two edges of 0.03 s each.
     assert widths.std() == pytest.approx(0.03 * 2**0.5, rel=0.3)
     peaks = [
-        np.degrees(plan.program[round(w.start_s * 1000) : round(w.input_end_s * 1000), 2].max())
+        np.degrees(
+            plan.orders.program[round(w.start_s * 1000) : round(w.input_end_s * 1000), 2].max()
+        )
         for w in plan.windows
     ]
     assert np.std(peaks) / np.mean(peaks) == pytest.approx(0.08, rel=0.35)
@@ -115,7 +117,7 @@ def test_pilot_keeps_off_during_an_input_unless_he_corrects_early() -> None:
     quiet = schedule(card, 17.0, 1e-3, np.random.default_rng(1))
     for w in quiet.windows:
         inside = slice(round(w.start_s * 1000), round(w.input_end_s * 1000))
-        assert quiet.attention[inside].max() == 0.0
+        assert quiet.orders.attention[inside].max() == 0.0
     eager = replace(card, pilot=replace(card.pilot, early=1.0))
     early = schedule(eager, 17.0, 1e-3, np.random.default_rng(1))
     assert all(w.attention_s < w.input_end_s for w in early.windows)
@@ -137,7 +139,7 @@ def test_the_same_inputs_are_flown_in_another_air() -> None:
     card = replace(card, air=replace(card.air, turbulence_mps=0.3))
     first, same, other = (fly(card, seed=4, noise_seed=n) for n in (None, 4, 5))
     assert np.array_equal(first.states, same.states)
-    assert np.array_equal(first.schedule.program, other.schedule.program)
+    assert np.array_equal(first.schedule.orders.program, other.schedule.orders.program)
     assert first.draws.values["cg_m"].tolist() == other.draws.values["cg_m"].tolist()
     assert first.air[:, 3:].std(axis=0) == pytest.approx(other.air[:, 3:].std(axis=0), rel=0.5)
     assert abs(np.corrcoef(first.air[:, 5], other.air[:, 5])[0, 1]) < 0.3
@@ -154,7 +156,7 @@ def test_three_multisines_reach_the_sticks_orthogonal_and_in_their_own_sizes() -
         ],
     }  # fmt: skip
     plan = schedule(cards.parse(document, "card"), 17.0, 1e-3, np.random.default_rng(1))
-    sticks = plan.program[:, :3]
+    sticks = plan.orders.program[:, :3]
     assert np.degrees(np.abs(sticks).max(axis=0)) == pytest.approx([2.0, 3.0, 4.0], rel=0.01)
     unit = sticks / np.linalg.norm(sticks, axis=0)
     assert np.abs(unit.T @ unit - np.eye(3)).max() < 1e-9
@@ -230,7 +232,7 @@ def test_truth_windows_hold_the_input_and_nothing_of_the_next(tmp_path: Path) ->
         if following:
             assert one["end_s"] <= following["start_s"]
         axis = {"elevator": 0, "aileron": 1, "rudder": 2, "throttle": 3}[one["axes"][0]]
-        program = record.schedule.program[:, axis]
+        program = record.schedule.orders.program[:, axis]
         before = (record.t_s > one["start_s"] - 1.0) & (record.t_s < one["start_s"] - 2e-3)
         assert np.abs(program[before]).max() < 1e-12
         inside = (record.t_s > one["start_s"]) & (record.t_s < one["input_end_s"])

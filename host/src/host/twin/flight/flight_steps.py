@@ -10,9 +10,9 @@ from host.aircraft.air import Atmosphere, Turbulence, density_kgpm3, gust_step
 from host.aircraft.airframe import DOWN, STATE_COUNT, Airframe, Array, P
 from host.aircraft.rigid_body import rotate_to_body, step
 from host.compiled import compiled_fast
+from host.twin.flight.pilot import Orders
 from host.twin.flight.stick_commands import (
     Hands,
-    Orders,
     Radio,
     pulse_widths,
     servo_commands,
@@ -28,6 +28,7 @@ def fly_steps(
     radio: Radio,
     atmosphere: Atmosphere,
     turbulence: Turbulence,
+    trimmed: Array,
     launch: Array,
     rest: Array,
     wind: Array,
@@ -56,7 +57,7 @@ def fly_steps(
     for i in range(first, last):
         if i == hands.ground_steps:
             x[:] = launch
-            command[:] = orders.trimmed
+            command[:] = trimmed
         flying = i >= hands.ground_steps
         if flying and x[DOWN] > 0.0:
             return i
@@ -71,7 +72,9 @@ def fly_steps(
 
         row = i // hands.period_steps
         if i % hands.period_steps == 0:  # a new receiver frame
-            sticks_moved(hands, orders, limit_rad, wind, states, x, i, stick_noise[row], held)
+            sticks_moved(
+                hands, orders, trimmed, limit_rad, wind, states, x, i, stick_noise[row], held
+            )
             pulse_widths(
                 hands,
                 radio,

@@ -28,7 +28,6 @@ from host.twin.flight.stick_commands import (
     LINK_PRESET,
     NEUTRAL_US,
     Hands,
-    Orders,
     Radio,
 )
 from host.twin.testcard.cards import Card
@@ -86,7 +85,7 @@ class FlightRecord:
     @property
     def touched_ground(self) -> bool:
         """Whether the flight ended on the ground before the card was through."""
-        return len(self.t_s) < len(self.schedule.attention)
+        return len(self.t_s) < len(self.schedule.orders.attention)
 
     @property
     def sink_mps(self) -> float:
@@ -162,7 +161,7 @@ def fly(
     wanted = card.flight.airspeed_mps or plane.scalar("trim.airspeed_mps")
     trim = solve(frame, wanted, density_kgpm3=density_kgpm3(atmosphere, card.flight.height_m))
     plan = schedule(card, wanted, STEP_S, rng_pilot, by_logger=added_us is not None)
-    n = len(plan.attention)
+    n = len(plan.orders.attention)
     hands = _hands(card, frame, trim, draws, n)
     wind = np.array([card.air.wind_north_mps, card.air.wind_east_mps, 0.0])
     launch, rest = _start(card, trim, wind)
@@ -172,10 +171,6 @@ def fly(
     starts = np.arange(frames, dtype=np.float64) * RC_PERIOD_S
     link, preset = _link(card, starts)
     radio = Radio(link, preset, np.zeros((0, 3)) if added_us is None else added_us)
-    orders = Orders(
-        trim.command, plan.program, plan.attention, plan.bank_rad, plan.airspeed_mps,
-        plan.switch_us, plan.aim_m,
-    )  # fmt: skip
     turbulence = air_model.turbulence(card.air, card.flight.height_m)
     noise = rng_air.standard_normal((n if card.air.turbulence_mps > 0.0 else 1, 4))
     stick_noise = rng_radio.standard_normal((frames, 8 + RC_CHANNELS))
@@ -191,8 +186,9 @@ def fly(
     for first in range(0, n, chunk):
         last = min(first + chunk, n)
         done = fly_steps(
-            frame, hands, orders, radio, atmosphere, turbulence, launch, rest, wind, noise,
-            stick_noise, STEP_S, first, last, x, z, held, command, states, more, air, pulses,
+            frame, hands, plan.orders, radio, atmosphere, turbulence, trim.command, launch, rest,
+            wind, noise, stick_noise, STEP_S, first, last, x, z, held, command, states, more, air,
+            pulses,
         )  # fmt: skip
         if progress is not None:
             progress(done / n)

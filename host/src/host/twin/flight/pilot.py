@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -60,9 +61,8 @@ class Window:
     attention_s: float
 
 
-@dataclass(frozen=True, slots=True)
-class Schedule:
-    """What the pilot does, on the time grid of the flight.
+class Orders(NamedTuple):
+    """What the pilot means to do, on the time grid of the flight: n steps.
 
     Attributes
     ----------
@@ -76,7 +76,6 @@ class Schedule:
         Pulse of the switch channel.
     aim_m : (n, 2) or (0, 2) array
         Place north and east of home that is flown to; `NOWHERE_M` in turns.
-    windows : list of Window
     """
 
     program: Array
@@ -85,7 +84,14 @@ class Schedule:
     airspeed_mps: Array
     switch_us: Array
     aim_m: Array
-    windows: list[Window] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """What the pilot means to do, and the maneuvers that come of it."""
+
+    orders: Orders
+    windows: list[Window]
 
 
 def schedule(
@@ -115,7 +121,7 @@ def schedule(
     """
     n = round(duration_s(card) / step_s)
     t = np.arange(n, dtype=np.float64) * step_s
-    result = Schedule(
+    result = Orders(
         program=np.zeros((n, 4)),
         attention=np.ones(n),
         bank_rad=np.zeros(n),
@@ -151,15 +157,16 @@ def schedule(
                 else _fly_input(card, s, start, t, result, rng)
             )
             inputs.append((s, *times))
+    windows = []
     for i, (s, start, end, again) in enumerate(inputs):
         tail = end + WINDOW_TAIL_S
         if i + 1 < len(inputs):
             tail = min(tail, inputs[i + 1][1])
-        result.windows.append(Window(s.kind, s.axes, start, end, min(tail, n * step_s), again))
-    return result
+        windows.append(Window(s.kind, s.axes, start, end, min(tail, n * step_s), again))
+    return Schedule(result, windows)
 
 
-def _enable(t: Array, into: Schedule) -> None:
+def _enable(t: Array, into: Orders) -> None:
     """Show the travel of the sticks and hold the sign, on the ground."""
     stirring = _span(t, STIR_S, SIGN_S)
     quarter = np.floor(t[stirring] - STIR_S) % 4
@@ -172,7 +179,7 @@ def _enable(t: Array, into: Schedule) -> None:
 
 
 def _leave_to_logger(
-    card: Card, s: Segment, trigger_s: float, t: Array, into: Schedule
+    card: Card, s: Segment, trigger_s: float, t: Array, into: Orders
 ) -> tuple[float, float, float]:
     """Trigger one row; return start and end of its shape and when the pilot corrects again."""
     start = trigger_s + s.before_s
@@ -187,7 +194,7 @@ def _leave_to_logger(
 
 
 def _fly_input(
-    card: Card, s: Segment, start_s: float, t: Array, into: Schedule, rng: np.random.Generator
+    card: Card, s: Segment, start_s: float, t: Array, into: Orders, rng: np.random.Generator
 ) -> tuple[float, float, float]:
     """Add one input; return its start, its end and when the pilot corrects again."""
     pilot = card.pilot

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from host.aircraft.airframe import DOWN, EAST, NORTH, Q0, Q1, Q2, Q3, Array
 from host.aircraft.rigid_body import rotate_to_body, rotate_to_ned
 from host.compiled import compiled_part
-from host.twin.flight.pilot import NOWHERE_M
+from host.twin.flight.pilot import NOWHERE_M, Orders
 
 # Futaba: neutral 1520 us, +-400 us full throw.
 NEUTRAL_US = 1520.0
@@ -43,18 +43,6 @@ class Hands(NamedTuple):
     servo_gain: Array  # elevator, aileron, rudder: real deflection over commanded deflection
     servo_zero_rad: Array
     servo_late_us: float
-
-
-class Orders(NamedTuple):
-    """What the card asks of the pilot at each of n steps; the rest is as in `Schedule`."""
-
-    trimmed: Array
-    program: Array
-    attention: Array
-    bank_rad: Array
-    airspeed_mps: Array
-    switch_us: Array
-    aim_m: Array
 
 
 class Radio(NamedTuple):
@@ -103,6 +91,7 @@ def attitude_held(hands: Hands, orders: Orders, wind: Array, s: Array, i: int, h
 def sticks_moved(
     hands: Hands,
     orders: Orders,
+    trimmed: Array,
     limit_rad: Array,
     wind: Array,
     states: Array,
@@ -115,7 +104,7 @@ def sticks_moved(
     flying = i >= hands.ground_steps
     for k in range(4):
         held[4 + k] += 0.02 * (-held[4 + k] + hands.remnant_rad * 10.0 * noise[4 + k])
-        held[k] = orders.trimmed[k] + orders.program[i, k] + held[4 + k] * (1.0 if flying else 0.0)
+        held[k] = trimmed[k] + orders.program[i, k] + held[4 + k] * (1.0 if flying else 0.0)
     if flying:
         j = max(i - hands.delay_steps, hands.ground_steps)
         attitude_held(hands, orders, wind, states[j] if j < i else x, i, held)
