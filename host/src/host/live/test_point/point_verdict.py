@@ -38,8 +38,8 @@ CALM, GUSTS_POWER = 1.4, 0.9
 # Weight of the estimate in the logarithm, the movement has the rest: in calm air by the residuals
 # of the promise, in gusts by its own, of which two flights of one point differ by a quarter.
 CALM_SHARE, GUSTS_SHARE = 0.6, 0.3
-# What is expected scatters. Where their mean is 1.35 times the promise, as many points are within
-# 1.3 as are not (353 verdicts of seeds 14000-14259 and 16300-16559; 1.36 and 1.34 by themselves).
+# The expected half-width scatters about the true one: of points expected at 1.35 times the promise
+# as many are within 1.3 as are not (353 verdicts; seeds 14000-14259 say 1.36, 16300-16559 1.34).
 EVEN_ODDS = 1.03
 LEAST_OF_MOVED = 0.5  # no rows tell so much more than their movement: such a fit ran away
 WEAK, LOUD = 0.7, 1.5  # of the wanted amplitude
