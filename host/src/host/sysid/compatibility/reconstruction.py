@@ -193,7 +193,7 @@ def reconstruct(
 
 
 def _beside_imu(
-    told: tuple[float, float], sd: float, priors: Mapping[str, tuple[float, float]]
+    estimate: tuple[float, float], sd: float, priors: Mapping[str, tuple[float, float]]
 ) -> tuple[float, float]:
     """Return the zero of the alpha vane and its deviation beside errors of the IMU, rad.
 
@@ -202,7 +202,7 @@ def _beside_imu(
 
     Parameters
     ----------
-    told : tuple of float
+    estimate : tuple of float
         The zero and its deviation where the IMU has no error.
     sd : float
         Of the zero by its calibration.
@@ -210,8 +210,9 @@ def _beside_imu(
         Mean and deviation of every error.
     """
     bias, tilt = priors["accel_bias_x_mps2"][1] / GRAVITY_MPS2, priors["imu_tilt_y_rad"][1]
-    by_data = told[1] ** -2 - sd**-2
-    measured, variance = told[0] * told[1] ** -2 / by_data, 1.0 / by_data + bias**2 + tilt**2
+    by_data = estimate[1] ** -2 - sd**-2
+    measured = estimate[0] * estimate[1] ** -2 / by_data
+    variance = 1.0 / by_data + bias**2 + tilt**2
     left = 1.0 / (1.0 / variance + sd**-2)
     return measured * left / variance, float(np.sqrt(left))
 

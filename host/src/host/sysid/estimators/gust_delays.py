@@ -95,7 +95,7 @@ def estimate_delays(
     count = len(model.parameters)
     groups = [d for d in model.delays if not set(d.outputs) <= set(GUST_BLIND)]
     by_force = bool(set(FORCES) & set(model.outputs))
-    untold = [] if by_force else [d for d in groups if _late_by_pade(d)]
+    by_prior = [] if by_force else [d for d in groups if _late_by_pade(d)]
     dt_s = max(m.dt_s for m in maneuvers)
     values = {d.name: 0.0 for d in groups}
     estimate, found = start[:count], None
@@ -109,7 +109,7 @@ def estimate_delays(
         values = {
             d.name: float(np.clip(removed[d.name] + step.value(d.name), -d.limit_s, d.limit_s))
             for d in groups
-        } | dict.fromkeys((d.name for d in untold), 0.0)
+        } | dict.fromkeys((d.name for d in by_prior), 0.0)
         sd = step.standard_error
         if near_its_optimum(step) and all(
             abs(values[n] - before[n]) < SETTLED_SD * sd[step.index(n)] for n in values
@@ -119,7 +119,7 @@ def estimate_delays(
         half = first.half_width()
         delays = {d.name: (0.0, float(half[first.index(d.name)])) for d in groups}
         return DelayEstimate(delays, estimate, _added_covariance(first, list(values), count))
-    found = _as_known_before(found, untold)
+    found = _as_known_before(found, by_prior)
     widened = _with_hold_error(found, groups, HOLD_SHARE * dt_s)
     half = NORMAL_95 * widened.standard_error
     gust_mps = gust_deviation_mps(found, airspeed_mps)

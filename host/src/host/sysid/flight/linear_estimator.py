@@ -23,13 +23,9 @@ from host.sysid.aerodynamics.coefficient_table import (
 )
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_corrections import corrections
-from host.sysid.estimators.filter_error_gust import (
-    without_gust_parameters,
-)
+from host.sysid.estimators.filter_error_gust import without_gust_parameters
 from host.sysid.estimators.gust_model import VANES
-from host.sysid.estimators.gust_penetration import (
-    without_gust_penetration,
-)
+from host.sysid.estimators.gust_penetration import without_gust_penetration
 from host.sysid.estimators.method_registry import fit, refuse_unless_finite
 from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
 from host.sysid.flight.commanded_surfaces import brought_behind, servo_of

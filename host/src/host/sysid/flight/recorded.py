@@ -85,9 +85,9 @@ def _pot(columns: Mapping[str, Array], surface: str) -> Array | None:
 
 def _command(columns: Mapping[str, Array], surface: str) -> Array | None:
     """Return the command of a surface, of a virtual flight rad, of a log its pulse, us."""
-    told, sent, received = f"{surface}_command_rad", f"servo_{surface}_us", f"rc_{surface}_us"
-    if told in columns:
-        return columns[told]
+    command, sent, received = f"{surface}_command_rad", f"servo_{surface}_us", f"rc_{surface}_us"
+    if command in columns:
+        return columns[command]
     if sent not in columns or received not in columns:
         return None
     return np.where(columns[OWN_COLUMN] > 0.0, columns[sent], columns[received])

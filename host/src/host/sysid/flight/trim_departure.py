@@ -221,7 +221,8 @@ def correct_trim_departure(
         if along_mps > 0.0:
             moved = one_step.change(_with_turning_gust(straight), trim, data)
             turned = TURNING_SHARE * along_mps * (moved - still)
-        noisy = [_with_airspeed_noise(varying, data, cuts, draw) for draw in range(DRAWS)]
+        deviation = float(white_deviation([c["airspeed_mps"] for c in cuts]))
+        noisy = [_with_airspeed_noise(varying, data, cuts, deviation, n) for n in range(DRAWS)]
         drawn = [one_step.change(straight, trim, one) - still for one in noisy]
         fitted_too = np.diag(result.covariance) > 0.0  # what the fit left out stays out
         noise = consider_covariance(np.vstack(drawn) * fitted_too / np.sqrt(DRAWS))
@@ -279,19 +280,17 @@ def _with_airspeed_noise(
     varying: VaryingModel,
     data: Sequence[Maneuver],
     cuts: Sequence[Mapping[str, Array]],
+    deviation_mps: float,
     draw: int,
 ) -> list[Maneuver]:
-    """Return the maneuvers with white noise, as large as it is, added to the airspeed once more."""
-    rng = np.random.default_rng(draw)
-    deviation = white_deviation([c["airspeed_mps"] for c in cuts])
-    drawn = [
-        {**c, "airspeed_mps": v + deviation * rng.standard_normal(len(v))}
-        for c, v in ((c, c["airspeed_mps"]) for c in cuts)
-    ]
-    return [
-        replace(m, inputs=varying.maneuver(c, m.dt_s).inputs)
-        for m, c in zip(data, drawn, strict=True)
-    ]
+    """Return the maneuvers with white noise added to the airspeed once more."""
+    rng, noisy = np.random.default_rng(draw), []
+    for maneuver, columns in zip(data, cuts, strict=True):
+        speed = columns["airspeed_mps"]
+        noise = deviation_mps * rng.standard_normal(len(speed))
+        inputs = varying.maneuver({**columns, "airspeed_mps": speed + noise}, maneuver.dt_s).inputs
+        noisy.append(replace(maneuver, inputs=inputs))
+    return noisy
 
 
 def _with_turning_gust(varying: LinearModel) -> LinearModel:
