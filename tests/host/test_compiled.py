@@ -37,6 +37,12 @@ FACTOR = 2.0
 def times(x):
     return FACTOR * x
 """
+TRIM = """
+from host.aircraft.file import load
+from host.aircraft.trim import solve
+
+print(solve(load("ultrastick25e").airframe(), 17.0).state.tobytes().hex())
+"""
 SAID = re.compile(
     r"host: a first run compiles its kernels and keeps them for the next \(double, about \d+ s,"
     r" comes first\)\n"
@@ -105,6 +111,14 @@ def test_kernel_is_compiled_anew(compiled_before: Path, damage: str) -> None:
         index.write_bytes(moved)
     assert run(folder)[0].startswith("42.0")
     assert run(folder)[0] == "42.0 1 0"
+
+
+def test_a_run_that_compiles_gives_the_bits_of_every_later_run(tmp_path: Path) -> None:
+    (tmp_path / "kernel.py").write_text(TRIM)
+    (first, said), (later, silent) = run(tmp_path), run(tmp_path)
+    assert "compiles" in said
+    assert not silent
+    assert first == later
 
 
 @pytest.mark.parametrize(

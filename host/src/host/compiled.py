@@ -201,10 +201,20 @@ def _forget_oldest(place: Path, kind: str) -> None:
             shutil.rmtree(code, ignore_errors=True)
 
 
+def _options(reordered: bool) -> dict[str, Any]:
+    """Return numba's options.
+
+    A kernel that is called and not inlined is in the object files of all its callers. Whichever is
+    loaded first runs in all of them, and where sums are reordered each is another: the run that
+    compiled flew another last digit than those after it.
+    """
+    return {"error_model": "numpy", "fastmath": reordered, "forceinline": reordered}
+
+
 def _jit(function: FunctionType, reordered: bool, folder: Path | None) -> Any:
     import numba
 
-    jit: Any = functools.partial(numba.njit, error_model="numpy", fastmath=reordered)
+    jit: Any = functools.partial(numba.njit, **_options(reordered))
     if folder is None:
         return jit()(function)
     with _cache_in(folder):
@@ -276,7 +286,7 @@ def _digest(kernel: Kernel[..., Any]) -> str:
     digest = hashlib.sha256(numba.__version__.encode())
     for part in sorted(_all_of(kernel), key=lambda k: k.place):
         code = part.function.__code__
-        digest.update(f"{part.place} {part._reordered}".encode())
+        digest.update(f"{part.place} {_options(part._reordered)}".encode())
         for text in _instructions(code):
             digest.update(text)
         for name in sorted(code.co_names):

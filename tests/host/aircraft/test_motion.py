@@ -148,10 +148,11 @@ def test_glide_is_the_drag_over_lift_angle() -> None:
 def test_trim_says_when_there_is_none() -> None:
     with pytest.raises(TrimError, match=r"no trim at 3\.0 m/s"):
         solve(aircraft.load("ultrastick25e").airframe(), 3.0)
-    with pytest.raises(
-        TrimError, match=r"no trim at 1000000000\.0 m/s: no throttle balances the propeller"
-    ):
+    # At 1e9 m/s it is the last digit of a sum that decides how the search ends.
+    with pytest.raises(TrimError, match=r"no trim at 1000000000\.0 m/s: "):
         solve(aircraft.load("ultrastick25e").airframe(), 1e9)
+    with pytest.raises(TrimError, match=r"no trim at nan m/s: no throttle balances the propeller"):
+        solve(aircraft.load("ultrastick25e").airframe(), math.nan)
 
 
 @pytest.mark.parametrize("name", ["ultrastick25e", "kadetlt40", "lowsupertrainer"])
