@@ -10,7 +10,7 @@ from host.sysid.numerics.ar_noise import ArNoise, ar_filter, autocovariance
 from host.sysid.numerics.filter_problem import discrete_noise
 from host.sysid.numerics.fractional_delay import delay_columns, slope_by_delay
 from host.sysid.numerics.output_error_problem import OutputProblem
-from scipy import signal
+from scipy import linalg, signal
 
 STATES = ("alpha_rad", "q_radps")
 
@@ -140,6 +140,14 @@ def test_whitening_turns_the_ar_covariance_into_the_identity() -> None:
     sign, log_determinant = np.linalg.slogdet(covariance)
     assert sign > 0
     assert memory.log_determinant() == pytest.approx(log_determinant, abs=1e-9)
+
+
+def test_noise_of_poles_next_to_one_has_a_positive_variance() -> None:
+    """What a fit left of a record without noise had -7e14; `host identify` ended in a traceback."""
+    poles = [0.99661, 0.99661, 0.99561, 0.99561, 0.999, 0.99663]
+    found = autocovariance(-np.poly(poles)[1:], 200)
+    assert found[0] > 0.0
+    assert np.linalg.eigvalsh(linalg.toeplitz(found)).min() > -1e-9 * found[0]
 
 
 def test_a_diverging_response_is_reported_not_returned() -> None:

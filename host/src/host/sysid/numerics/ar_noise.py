@@ -15,6 +15,7 @@ from scipy import linalg
 from host.arrays import Array
 
 POLE_LIMIT = 0.999  # radius: nearer to one, 2000 samples cannot separate noise from drift
+MOST_REFLECTED = 1.0 - 1e-9  # reflection coefficient: what rounding leaves of a stable one
 SHRINKING, MOST_SHRINKINGS = 0.995, 200  # of the radius of poles
 
 
@@ -65,23 +66,25 @@ class ArNoise:
 def autocovariance(coefficient: Array, lags: int) -> Array:
     """Return the autocovariance of an AR process of unit innovation variance, lags 0 to `lags`.
 
-    It solves the Yule-Walker equations, then continues by the recursion of the process.
+    By the Levinson-Durbin recursion, down to the reflection coefficients and up again. With these
+    within one it is positive definite whatever rounding does: of poles next to one the Yule-Walker
+    equations gave a negative variance.
     """
     order = len(coefficient)
-    if order == 0:
-        return np.concatenate([[1.0], np.zeros(lags)])
-    equations = np.zeros((order + 1, order + 1))
-    for lag in range(order + 1):
-        equations[lag, lag] += 1.0
-        for k in range(1, order + 1):
-            equations[lag, abs(lag - k)] -= coefficient[k - 1]
-    right = np.zeros(order + 1)
-    right[0] = 1.0
-    start = np.linalg.solve(equations, right)
+    reflection, left = np.zeros(order), np.asarray(coefficient, dtype=np.float64)
+    for last in range(order - 1, -1, -1):
+        reflection[last] = np.clip(left[last], -MOST_REFLECTED, MOST_REFLECTED)
+        left = left[:last] + reflection[last] * left[:last][::-1]
+        left /= 1.0 - reflection[last] ** 2
+    innovation = 1.0 / np.prod(1.0 - reflection**2)
     result = np.zeros(max(lags, order) + 1)
-    result[: order + 1] = start
+    result[0], so_far = innovation, np.zeros(0)
+    for lag, part in enumerate(reflection, start=1):
+        result[lag] = part * innovation + so_far @ result[1:lag][::-1]
+        so_far = np.append(so_far - part * so_far[::-1], part)
+        innovation *= 1.0 - part**2
     for lag in range(order + 1, lags + 1):
-        result[lag] = coefficient @ result[lag - order : lag][::-1]
+        result[lag] = so_far @ result[lag - order : lag][::-1]
     return result[: lags + 1]
 
 
