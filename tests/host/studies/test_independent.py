@@ -6,13 +6,20 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import airframe_data
 from host.instrument.deviations import sensor_error_model
+from host.physical.calibration import load_calibration
 from host.sysid.answer.trust_rules import doubts_of
+from host.sysid.compatibility.path_preparation import density_share
 from host.sysid.flight.linear_estimator import identify
 from studies import independent
 from studies.foreign.aeroplane import DENSITY_KGPM3, TRAINER, motion
 from studies.foreign.flight import COLUMNS, SPEED_MPS, STEP_S, Air, derivatives, fly
 from studies.foreign.gust_field import SAMPLES, STEP_M, Gusts, gusts
-from studies.foreign.instrument import TRAINER_FILE, drawn_file, with_sensor_errors
+from studies.foreign.instrument import (
+    SENSORS_FILE,
+    TRAINER_FILE,
+    drawn_file,
+    with_sensor_errors,
+)
 
 
 @pytest.mark.parametrize("form", ["dryden", "karman"])
@@ -149,6 +156,12 @@ def test_the_file_tells_sensors_as_quick_as_those_that_were_flown() -> None:
     turns_per_s = sensors.vane_hz_per_mps * SPEED_MPS
     assert sensors.vane_damping / (np.pi * turns_per_s) < 0.02 * STEP_S
     assert sensors.pitot_lag_s == 0.0
+
+
+def test_the_file_tells_the_density_that_is_drawn() -> None:
+    """The standard knows a warm fuselage too, which these flights have not."""
+    sensors = sensor_error_model(str(TRAINER_FILE), load_calibration(SENSORS_FILE))
+    assert density_share(sensors) == sensors.errors["density_share"].of_mean() == 0.005
 
 
 def test_coefficients_of_a_calm_flight_hold_with_its_file() -> None:

@@ -21,6 +21,7 @@ from host.sysid.aerodynamics.coefficient_table import (
 from host.sysid.answer.estimate_lines import model_lines
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.answer.verdict import verdict_lines
+from host.sysid.compatibility.path_preparation import density_share
 from host.sysid.compatibility.reconstruction import Compatibility, SensorErrorEstimate
 from host.sysid.compatibility.sensor_corrections import (
     INSTANTANEOUS_ERRORS,
@@ -101,8 +102,9 @@ def test_an_instrument_that_errs_is_put_right_to_the_digit() -> None:
         measured[f"{name}_rad"] = angle
     part = 0.6
     pitot, thin = 1.0 + part * errors["pitot_scale"], 1.0 + (1.0 - part) * errors["pitot_scale"]
-    measured["qbar_pa"] = pitot * true["qbar_pa"] + errors["pitot_zero_pa"]
-    measured["density_kgpm3"] = true["density_kgpm3"] / thin
+    dense = 1.0 + errors["density_share"]
+    measured["qbar_pa"] = dense * pitot * true["qbar_pa"] + errors["pitot_zero_pa"]
+    measured["density_kgpm3"] = dense * true["density_kgpm3"] / thin
     measured["airspeed_mps"] = np.sqrt(2.0 * measured["qbar_pa"] / measured["density_kgpm3"])
     back = correct_columns(measured, errors, part)
     for name, values in true.items():
@@ -129,6 +131,27 @@ def test_only_what_is_told_is_taken_out() -> None:
     assert "wind_north_mps" not in left
     # 3 % of pitot, evenly, two of them, against 1 % of density.
     assert pressure_share(found) == pytest.approx(0.6, abs=0.01)
+
+
+def test_pressure_and_density_are_as_open_as_their_files_leave_them() -> None:
+    """Airspeed tells what pitot and density make together, not how much is of which."""
+    pitot, density = 0.02, density_share(None)
+    together = float(np.hypot(pitot, density))
+    half = 1.96 * together
+    found = Compatibility((finding("pitot_scale", 0.0, half, half),), {}, (), gps=False)
+    columns = motion()
+    columns |= {name: np.full(200, 1.0) for name in ("qbar_pa", "density_kgpm3", "airspeed_mps")}
+    left = residual_deviations(found)
+    assert set(left) == {"pitot_scale", "density_share"}
+    moved = [correct_columns(columns, {e: s}, pressure_share(found)) for e, s in left.items()]
+
+    def open_share(*names: str) -> float:
+        """Return the deviation of a product of columns, each of them 1."""
+        return float(np.linalg.norm([np.log(np.prod([m[n][0] for n in names])) for m in moved]))
+
+    assert open_share("qbar_pa") == pytest.approx(pitot, rel=0.02)
+    assert open_share("density_kgpm3") == pytest.approx(density, rel=0.02)
+    assert open_share("airspeed_mps", "airspeed_mps") == pytest.approx(together, rel=0.02)
 
 
 def test_a_late_vane_is_read_later() -> None:
@@ -176,7 +199,7 @@ def test_one_step_foretells_the_fit_of_disturbed_data() -> None:
     moved = {
         m.error: m for m in systematic_error_shifts(result, [maneuver], [columns], [found], trim)
     }
-    assert set(moved) == set(size)
+    assert set(moved) == {*size, "density_share"}
     for error, deviation in size.items():
         other = correct_columns(columns, {error: deviation}, pressure_share(found))
         bent = Trim(

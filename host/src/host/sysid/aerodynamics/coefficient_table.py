@@ -210,7 +210,10 @@ def _variances(assumed: dict[str, Array], sensed: dict[str, list[Array]]) -> dic
 PERTURBATION = 1e-4  # share by which a mass property is changed for its sensitivity
 QBAR, VANE, THRUST = "dynamic pressure", "vanes", "thrust"
 ANGLES = ("alpha_rad", "beta_rad")
-SHARED = {"pitot_scale": QBAR, "pitot_zero_pa": QBAR, "alpha_scale": VANE, "beta_scale": VANE}
+SHARED = {
+    "pitot_scale": QBAR, "pitot_zero_pa": QBAR, "density_share": QBAR,
+    "alpha_scale": VANE, "beta_scale": VANE,
+}  # fmt: skip
 
 
 def _perturbed_mass_properties(

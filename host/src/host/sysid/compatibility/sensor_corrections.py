@@ -20,7 +20,9 @@ from host.sysid.compatibility.reconstruction import Compatibility
 
 RATES = tuple(f"{a}_radps" for a in "pqr")
 FORCES = tuple(f"a{a}_mps2" for a in "xyz")
-INSTANTANEOUS_ERRORS = (*INERTIAL, *FLOW, *PITOT)  # without delays
+# An error of density and dynamic pressure that leaves V squared as it is: nothing observes it.
+DENSITY = "density_share"
+INSTANTANEOUS_ERRORS = (*INERTIAL, *FLOW, *PITOT, DENSITY)  # without delays
 # The pitot's delay is not corrected: informed on six of twelve survey flights, 8 ms too long.
 DELAYED_COLUMNS = {DELAYS[0]: AIR[1:]}
 CORRECTABLE = (*INSTANTANEOUS_ERRORS, *DELAYED_COLUMNS)
@@ -61,11 +63,14 @@ def without_estimated_delays(found: Compatibility) -> Compatibility:
 
 def residual_deviations(found: Compatibility) -> dict[str, float]:
     """Return the standard deviation that remains of every error: estimated or calibrated."""
-    return {
+    remaining = {
         f.name: (f.half_width if f.data_informed else f.prior_half_width) / NORMAL_95
         for f in found.findings
         if f.name in CORRECTABLE
     }
+    if PITOT[0] in remaining:
+        remaining[DENSITY] = _density_beside_airspeed(found)
+    return remaining
 
 
 def pressure_share(found: Compatibility) -> float:
@@ -73,6 +78,17 @@ def pressure_share(found: Compatibility) -> float:
     total = found["pitot_scale"].prior_half_width / NORMAL_95
     density = density_share(found.instrument)
     return max(1.0 - (density / max(total, density)) ** 2, LEAST_PRESSURE_SHARE)
+
+
+def _density_beside_airspeed(found: Compatibility) -> float:
+    """Return the standard deviation of density once V squared is known.
+
+    Scales of pitot and density make V squared together. What they leave it to be is one error,
+    `pitot_scale`, of which dynamic pressure has `pressure_share`. How it divides between the two
+    is another, independent of it. Without that dynamic pressure counted as known to 1.8 % where
+    the pitot's scale was known to 2.
+    """
+    return float(np.sqrt(pressure_share(found))) * density_share(found.instrument)
 
 
 def correct_columns(
@@ -112,21 +128,22 @@ def correct_columns(
         if f"{name}_rad" in columns:
             zero, scale = at(f"{name}_zero_rad", 0.0), at(f"{name}_scale", 0.0)
             result[f"{name}_rad"] = (columns[f"{name}_rad"] - zero) / (1.0 + scale)
-    return result | _correct_pitot(columns, at("pitot_scale", 0.0), at("pitot_zero_pa", 0.0), part)
+    return result | _correct_pitot(columns, errors, part)
 
 
 def _correct_pitot(
-    columns: Mapping[str, Array], scale: float, zero: float, part: float
+    columns: Mapping[str, Array], errors: Mapping[str, float], part: float
 ) -> dict[str, Array]:
+    scale, zero, dense = (errors.get(name, 0.0) for name in (*PITOT, DENSITY))
     density = columns.get("density_kgpm3", np.array(1.225))
     corrected = {}
     if AIR[0] in columns:
         square = columns[AIR[0]] ** 2 - 2.0 * zero / density
         corrected[AIR[0]] = np.sqrt(np.maximum(square, 0.0) / (1.0 + scale))
     if "qbar_pa" in columns:
-        corrected["qbar_pa"] = (columns["qbar_pa"] - zero) / (1.0 + part * scale)
+        corrected["qbar_pa"] = (columns["qbar_pa"] - zero) / (1.0 + part * scale) / (1.0 + dense)
     if "density_kgpm3" in columns:
-        corrected["density_kgpm3"] = density * (1.0 + scale) / (1.0 + part * scale)
+        corrected["density_kgpm3"] = density * (1.0 + scale) / (1.0 + part * scale) / (1.0 + dense)
     return corrected
 
 
