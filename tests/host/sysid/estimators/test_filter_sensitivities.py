@@ -78,7 +78,7 @@ def test_gradient_and_information_are_those_of_differences() -> None:
         W = here.gains[0.02].whitener
         moved = [(a - b) / (2.0 * width[k]) @ W.T for a, b in zip(up.e, down.e, strict=True)]
         white.append(np.concatenate(moved).ravel())
-        spread.append((W @ (up.S[0] - down.S[0]) @ W.T / (2.0 * width[k])).ravel())
+        spread.append((W @ (up.filters[0].S - down.filters[0].S) @ W.T / (2.0 * width[k])).ravel())
     J, L = np.array(white), np.array(spread)
     exact = np.vstack(
         [s.reshape(-1, len(theta)) for s in whitened_innovation_sensitivities(problem, theta, here)]

@@ -69,7 +69,9 @@ def test_innovations_at_the_truth_are_white_and_of_their_size(axis: str) -> None
     for maneuver in flights:
         point = FilterProblem(model, [maneuver], PROCESS[axis]).evaluate(theta)
         assert point is not None
-        white = linalg.solve_triangular(np.linalg.cholesky(point.S[0]), point.e[0].T, lower=True)
+        white = linalg.solve_triangular(
+            np.linalg.cholesky(point.filters[0].S), point.e[0].T, lower=True
+        )
         white = white[:, 50:]  # the filter starts without knowing the gust
         square += np.mean(white**2, axis=1) / len(flights)
         lagged += np.mean(white[:, 1:] * white[:, :-1], axis=1) / len(flights)

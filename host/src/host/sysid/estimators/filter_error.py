@@ -24,6 +24,7 @@ from host.sysid.numerics.filter_scoring import (
 )
 from host.sysid.numerics.gauss_newton import GaussNewtonResult, damped_step, gauss_newton
 from host.sysid.numerics.information_inverse import covariance_from_information
+from host.sysid.numerics.intermittent_filter import too_slow
 from host.sysid.numerics.maneuver_agreement import maneuver_influence
 from host.sysid.numerics.output_error import minimise
 from host.sysid.numerics.restricted_likelihood import half_log_determinants, restricted_slopes
@@ -73,8 +74,11 @@ def fit_filter_error(
     Raises
     ------
     IdentificationError
-        If no start is finite.
+        If no start is finite, or there is no compiler for so many samples with missing outputs.
     """
+    slow = too_slow(maneuvers)
+    if slow:
+        raise IdentificationError(slow)
     if process is None:
         rows = {t.row for t in model.terms if t.matrix == "A"}
         process = tuple(model.states[i] for i in sorted(rows))
@@ -102,9 +106,7 @@ def fit_filter_error(
     theta, point = found.theta, found.trial
     factor: Array = np.ones(len(theta))
     if hac:
-        white = [
-            e @ point.gains[m.dt_s].whitener.T for e, m in zip(point.e, maneuvers, strict=True)
-        ]
+        white = [point.whitened(k, point.uncorrelated(k)) for k in range(len(maneuvers))]
         steps_s = [m.dt_s for m in maneuvers]
         factor = hac_inflation(
             whitened_innovation_sensitivities(problem, theta, point), white, steps_s, covariance
@@ -127,7 +129,7 @@ def fit_filter_error(
         residuals=tuple(point.e),
         fitted=tuple(m.outputs - e for m, e in zip(maneuvers, point.e, strict=True)),
         residual_kind="innovation",
-        noise_covariance=np.atleast_2d(np.cov(np.vstack(point.e).T)),
+        noise_covariance=problem.output_problem.residual_covariance([e.T for e in point.e]),
         iterations=found.iterations,
         converged=found.converged,
         warnings=tuple(warnings),
@@ -202,7 +204,7 @@ def _restricted(
 def _first_guess(problem: FilterProblem, first: Array, *, fit_first: bool) -> Array:
     """Return the estimate of output error, its residuals split between both kinds of noise."""
     optimum = minimise(problem.output_problem, first, max_iterations=15 if fit_first else 0)
-    deviation = np.maximum(np.std(np.hstack(optimum.residuals), axis=1), 1e-12)
+    deviation = problem.output_problem.residual_deviation(optimum.residuals)
     A, _, C, _ = problem.model.matrices(optimum.theta)
     return np.concatenate([optimum.theta, first_noise(A, C, problem.process_index, deviation)])
 

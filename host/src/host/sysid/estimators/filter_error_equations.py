@@ -68,7 +68,7 @@ def fit_equation_filter_error(
     )
     problem.set_steps(first.standard_error)
     outputs = problem.output_problem
-    deviation = np.maximum(np.std(np.vstack(first.residuals), axis=0), 1e-12)
+    deviation = outputs.residual_deviation([r.T for r in first.residuals])
     A, _, C, _ = first.model.matrices(first.estimate)
     driven = first_noise(A, C, problem.process_index, deviation)
     theta = np.concatenate([first.estimate, driven])
@@ -95,7 +95,7 @@ def fit_equation_filter_error(
         residuals=tuple(point.e),
         fitted=tuple(m.outputs - e for m, e in zip(maneuvers, point.e, strict=True)),
         residual_kind="innovation",
-        noise_covariance=np.atleast_2d(np.cov(np.vstack(point.e).T)),
+        noise_covariance=outputs.residual_covariance([e.T for e in point.e]),
         iterations=found.iterations,
         converged=found.converged,
         warnings=warnings,

@@ -136,12 +136,23 @@ def advance_outputs(
 ) -> Maneuver:
     """Return the maneuver with each output advanced by its delay."""
     shifts = {o: delays_s[d.name] for d in model.delays if d.name in delays_s for o in d.outputs}
-    t = maneuver.time_s
-    columns = [
-        np.interp(t + shifts.get(name, 0.0), t, column)
-        for name, column in zip(model.outputs, maneuver.outputs.T, strict=True)
-    ]
-    return replace(maneuver, outputs=np.column_stack(columns))
+    return _moved(maneuver, np.array([shifts.get(name, 0.0) for name in model.outputs]))
+
+
+def _moved(maneuver: Maneuver, shifts_s: Array) -> Maneuver:
+    """Return the maneuver with each output earlier by a time, (p,) s; what was measured moves along
+    to the nearest sample."""
+    t, rows = maneuver.time_s, np.arange(maneuver.samples)
+    columns = [np.interp(t + s, t, y) for s, y in zip(shifts_s, maneuver.outputs.T, strict=True)]
+    if maneuver.sampled is None or not maneuver.held:
+        return replace(maneuver, outputs=np.column_stack(columns))
+    sampled = np.ones_like(maneuver.sampled)
+    for j, steps in enumerate(np.round(shifts_s / maneuver.dt_s).astype(np.int64)):
+        if not maneuver.sampled[:, j].all():
+            before = rows + steps
+            known = (before >= 0) & (before < len(rows))
+            sampled[:, j] = known & maneuver.sampled[np.where(known, before, 0), j]
+    return replace(maneuver, outputs=np.column_stack(columns), sampled=sampled)
 
 
 def _round(
@@ -262,19 +273,13 @@ def _parameter(delay: DelayGroup, removed_s: float, dt_s: float) -> Parameter:
 
 def _centred(maneuver: Maneuver, model: LinearModel, dt_s: float) -> Maneuver:
     """Return deviations from the means, vanes a sample later: of a trim a delay shows nothing."""
-    t = maneuver.time_s
-    outputs = np.column_stack(
-        [
-            np.interp(t - dt_s, t, column) if name in VANES else column
-            for name, column in zip(model.outputs, maneuver.outputs.T, strict=True)
-        ]
-    )
+    late = _moved(maneuver, np.array([-dt_s if name in VANES else 0.0 for name in model.outputs]))
     inputs = maneuver.inputs - maneuver.inputs.mean(axis=0)
     rates = np.gradient(inputs, maneuver.dt_s, axis=0)
     return replace(
-        maneuver,
+        late,
         inputs=np.hstack([inputs, rates]),
-        outputs=outputs - outputs.mean(axis=0),
+        outputs=late.outputs - late.outputs.mean(axis=0),
     )
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from host.arrays import Array
+from host.arrays import Array, BoolArray
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
@@ -34,8 +34,10 @@ class Innovations:
         The same of the model alone, both noises fixed; used by the one-step update.
     process : tuple of str
     e : list of Array, each (samples, p)
-    white : list of Array, each (p, p)
-        Whitener of the innovations.
+    whiten : callable
+        What makes innovations of a maneuver, by its number, white and of unit variance.
+    sampled : list of Array or None, each (samples, p)
+        At which samples each output was measured; None: at all.
     sensitivities : list of Array, each (samples, p, P)
         Of the whitened innovations.
     """
@@ -45,7 +47,8 @@ class Innovations:
     inverse: Array
     process: tuple[str, ...]
     e: list[Array]
-    white: list[Array]
+    whiten: Callable[[int, Array], Array]
+    sampled: list[BoolArray | None]
     sensitivities: list[Array]
 
     def innovations(self, model: LinearModel, changed: Sequence[Maneuver]) -> list[Array] | None:
@@ -58,7 +61,9 @@ class Innovations:
             return None if filtered is None else filtered.scaled
         # e = y - C x_predicted (Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 5).
         point = FilterProblem(model, changed, self.process).evaluate(self.theta)
-        return None if point is None else point.e
+        if point is None:
+            return None
+        return [point.uncorrelated(k) for k in range(len(changed))]
 
     def coloured_covariance(self) -> Array:
         """Return the covariance corrected for coloured innovations; no variance becomes smaller.
@@ -67,10 +72,10 @@ class Innovations:
         correction is that of output error (Morelli & Klein 1997).
         """
         score_covariance = np.zeros_like(self.covariance)
-        for e, white, sensitivity in zip(self.e, self.white, self.sensitivities, strict=True):
-            whitened = e @ white.T
-            for j in range(whitened.shape[1]):
-                score_covariance += coloured_score_covariance(whitened[:, j], sensitivity[:, j])
+        for number, (e, sensitivity) in enumerate(zip(self.e, self.sensitivities, strict=True)):
+            white = self.whiten(number, e)
+            for part in score_covariances(white, sensitivity, self.sampled[number]):
+                score_covariance += part
         corrected = self.covariance @ score_covariance @ self.covariance
         factor = np.sqrt(
             np.maximum(np.diag(corrected) / np.maximum(np.diag(self.covariance), 1e-300), 1.0)
@@ -90,7 +95,6 @@ def innovations_of(
     point = problem.evaluate(theta)
     if point is None:
         return None
-    white = [point.gains[m.dt_s].whitener for m in maneuvers]
     sensitivities = whitened_innovation_sensitivities(problem, theta, point)
     count = problem.n_model
     model_sensitivities = [
@@ -100,7 +104,8 @@ def innovations_of(
     inverse[:count, :count] = covariance_from_information(
         np.diag(problem.output_problem.prior_precision) + sum(J.T @ J for J in model_sensitivities)
     )
-    return Innovations(theta, covariance, inverse, process, point.e, white, sensitivities)
+    e, seen = [point.uncorrelated(k) for k in range(len(maneuvers))], sampled_of(maneuvers)
+    return Innovations(theta, covariance, inverse, process, e, point.whitened, seen, sensitivities)
 
 
 def _of_equations(
@@ -122,5 +127,39 @@ def _of_equations(
     inverse[:count, :count] = covariance_from_information(
         np.diag(problem.output_problem.prior_precision) + sum(J.T @ J for J in shared)
     )
-    eye: list[Array] = [np.eye(len(model.outputs)) for _ in maneuvers]
-    return Innovations(theta, result.covariance_white, inverse, process, point.scaled, eye, slopes)
+    return Innovations(
+        theta,
+        result.covariance_white,
+        inverse,
+        process,
+        point.scaled,
+        lambda _, e: e,
+        sampled_of(maneuvers),
+        slopes,
+    )
+
+
+def sampled_of(maneuvers: Sequence[Maneuver]) -> list[BoolArray | None]:
+    """Return at which samples the outputs of each were measured; None: at all."""
+    return [m.sampled if m.held else None for m in maneuvers]
+
+
+def score_covariances(
+    white: Array, sensitivities: Array, sampled: BoolArray | None
+) -> Iterator[Array]:
+    """Yield the covariance of the score of every output's innovations, which may be coloured.
+
+    Parameters
+    ----------
+    white : Array, shape (samples, p)
+    sensitivities : Array, shape (samples, p, P)
+    sampled : Array or None, shape (samples, p)
+        What was not measured has no innovation; neighbours are those that were.
+
+    Yields
+    ------
+    Array, shape (P, P)
+    """
+    for j in range(white.shape[1]):
+        seen = slice(None) if sampled is None else sampled[:, j]
+        yield coloured_score_covariance(white[seen, j], sensitivities[seen, j])

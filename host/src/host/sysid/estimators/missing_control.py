@@ -15,13 +15,16 @@ from scipy import special
 
 from host.arrays import Array
 from host.sysid.estimators.gust_model import gust_model
-from host.sysid.estimators.innovations import PROCESS
+from host.sysid.estimators.innovations import (
+    PROCESS,
+    sampled_of,
+    score_covariances,
+)
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
-from host.sysid.numerics.coloured_residuals import coloured_score_covariance
 from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.filter_scoring import (
     fisher_scoring,
@@ -95,10 +98,10 @@ def missing_control(
     )
     coloured = np.zeros_like(information)
     slopes = whitened_innovation_sensitivities(problem, theta, point)
-    for e, maneuver, J in zip(point.e, maneuvers, slopes, strict=True):
-        white = e @ point.gains[maneuver.dt_s].whitener.T
-        for j in range(white.shape[1]):
-            coloured += coloured_score_covariance(white[:, j], J[:, j])
+    for k, (J, seen) in enumerate(zip(slopes, sampled_of(maneuvers), strict=True)):
+        white = point.whitened(k, point.uncorrelated(k))
+        for part in score_covariances(white, J, seen):
+            coloured += part
     new = np.zeros(len(theta), dtype=bool)
     new[first : first + count] = True
     # Freed of what the parameters of the model, and of its noise, could still take.

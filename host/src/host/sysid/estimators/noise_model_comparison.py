@@ -15,7 +15,7 @@ from host.arrays import Array
 from host.sysid.estimators.output_error_fit import fit_output_error
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
-from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.maneuver import Maneuver, measurements
 
 DECISIVE = 10.0  # Kass & Raftery, JASA 90 (1995): "very strong" on the scale of 2 log odds
 
@@ -50,7 +50,7 @@ def compare_noise_models(
         return result
     orders = np.asarray(alternative.details["noise_orders"])
     rows, outputs = sum(m.samples for m in maneuvers), len(result.model.outputs)
-    likelihood = float(alternative.details["cost"]) + 0.5 * rows * outputs
+    likelihood = float(alternative.details["cost"]) + 0.5 * measurements(maneuvers)
     parameters = len(alternative.estimate) + outputs + float(np.sum(orders))
     excess = 2.0 * (float(result.details["cost"]) - likelihood)
     excess += float(np.log(rows)) * (len(result.estimate) - parameters)

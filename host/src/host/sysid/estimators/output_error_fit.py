@@ -94,7 +94,7 @@ def fit_output_error(
         residuals=tuple(r.T.copy() for r in fit.optimum.residuals),
         fitted=tuple(r.y.T.copy() for r in fit.optimum.responses),
         residual_kind="output",
-        noise_covariance=_noise_covariance(problem, fit),
+        noise_covariance=problem.residual_covariance(fit.optimum.residuals),
         iterations=fit.optimum.iterations,
         converged=fit.optimum.converged,
         warnings=_warnings(problem, fit),
@@ -126,13 +126,6 @@ def _check_rates(maneuvers: Sequence[Maneuver]) -> None:
             f"output-error estimates one noise model, and records of {periods[0]:g} and"
             f" {periods[-1]:g} s a sample have two; use output-error-white or filter-error"
         )
-
-
-def _noise_covariance(problem: OutputProblem, fit: ArNoiseFit) -> Array:
-    """Return the covariance of the residuals; those not measured are zero, and do not count."""
-    scale = np.sqrt(problem.samples / problem.counts)
-    covariance = np.atleast_2d(np.cov(np.hstack(fit.optimum.residuals)))
-    return np.asarray(covariance * np.outer(scale, scale), dtype=np.float64)
 
 
 def _maneuver_influence(problem: OutputProblem, fit: ArNoiseFit) -> dict[str, float | Array]:

@@ -264,6 +264,8 @@ def _cost(found: FitResult, data: Sequence[Maneuver]) -> float:
 
     Of output error in noise with a memory, estimated beside; innovations are white.
     """
+    if found.residual_kind == "innovation" and any(m.held for m in data):
+        return float(np.asarray(found.details["cost"]))  # of as many values as were measured
     if found.residual_kind == "innovation":
         residuals = np.concatenate(found.residuals)
         return 0.5 * len(residuals) * float(np.linalg.slogdet(np.cov(residuals.T))[1])

@@ -22,9 +22,10 @@ from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.output_error_fit import sample_periods
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
-from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.maneuver import Maneuver, measurements
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel
+from host.sysid.numerics.intermittent_filter import too_slow
 
 GUST, FILTER = "filter-error-gust", "filter-error"
 MEMORY, WHITE = "output-error", "output-error-white"
@@ -140,8 +141,9 @@ def fit_by_evidence(
 
 def no_filter(model: LinearModel, maneuvers: Sequence[Maneuver]) -> str:
     """Return why no Kalman filter fits this model to these data; empty where one does."""
-    if any(m.held for m in maneuvers):
-        return "a filter takes the line between two values of a slow sensor for measurements"
+    slow = too_slow(maneuvers)
+    if slow:
+        return slow
     if model.known_noise:
         return "a filter estimates the noise, and this one is known"
     if isinstance(model, NonlinearModel) and not model.process_noise:
@@ -238,6 +240,6 @@ def _criterion(result: FitResult, maneuvers: Sequence[Maneuver]) -> float:
     samples, outputs = sum(m.samples for m in maneuvers), len(result.model.outputs)
     cost, count = float(np.asarray(result.details["cost"])), float(len(result.estimate))
     if result.residual_kind == "output":  # its variances are concentrated out
-        cost += 0.5 * samples * outputs
+        cost += 0.5 * measurements(maneuvers)
         count += outputs + float(np.sum(np.asarray(result.details["noise_orders"])))
     return 2.0 * cost + count * float(np.log(samples))

@@ -18,6 +18,7 @@ from host.sysid.estimators.gust_model import gust_model
 from host.sysid.estimators.innovations import PROCESS
 from host.sysid.flight.free_simulation import FreeResponses, weighted_fit
 from host.sysid.models.fit_result import FitResult
+from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.ar_noise import ArNoise, fit_ar, lagged_moments
 from host.sysid.numerics.filter_problem import discrete_noise
@@ -62,9 +63,17 @@ def excess_over_noise_model(
     rng = np.random.default_rng(DRAW_SEED)
     for number, (maneuver, response) in enumerate(zip(maneuvers, responses, strict=True)):
         block = block_length(maneuver.dt_s)
-        left = block_means((problem.measured(number) - response.y).T, block)
-        slopes = np.stack([block_means(J[:, count:], block) for J in response.sensitivities])
-        errors_drawn = random_errors(rng, wide, result, process, maneuver.dt_s, block, len(left))
+        seen = maneuver.sampled if maneuver.held else None
+        left = block_means(problem.residual(number, response.y).T, block, seen)
+        slopes = np.stack(
+            [
+                block_means(J[:, count:], block, problem.seen(number, j))
+                for j, J in enumerate(response.sensitivities)
+            ]
+        )
+        errors_drawn = random_errors(rng, wide, result, process, maneuver, block)
+        if seen is not None:  # of a mean over nothing that was measured both are zero
+            errors_drawn *= block_means(np.ones(seen.shape), block, seen).T[:, :, None]
         for j, errors in enumerate(errors_drawn[:, :, :AR_DRAWS]):
             none = [np.zeros((len(errors), 0))] * AR_DRAWS
             moments[j] += lagged_moments(list(errors.T), none, HIGHEST_ORDER)
@@ -96,9 +105,8 @@ def random_errors(
     wide: LinearModel,
     result: FitResult,
     process: Sequence[str],
-    dt_s: float,
+    maneuver: Maneuver,
     block: int,
-    means: int,
 ) -> Array:
     """Return outputs of a model that process noise alone drives, and their noise, (p, n, draws).
 
@@ -111,16 +119,16 @@ def random_errors(
         Of filter error.
     process : sequence of str
         Those states.
-    dt_s : float
+    maneuver : Maneuver
+        Gives how long, and at which samples each output is measured.
     block : int
         Samples of a mean.
-    means : int
     """
     A, _, C, _ = wide.matrices(result.estimate[: len(wide.parameters)])
     index = [wide.states.index(s) for s in process]
     intensity = np.zeros(len(A))
     intensity[index] = np.asarray(result.details["process_deviation"]) ** 2
-    F, covariance = discrete_noise(A, intensity, block * dt_s)
+    F, covariance = discrete_noise(A, intensity, block * maneuver.dt_s)
     root = _root(covariance)
     x = np.zeros((len(A), DRAWS))
     gusts = [k for k, s in enumerate(wide.states) if s.startswith("gust")]
@@ -128,7 +136,10 @@ def random_errors(
         own = np.ix_(gusts, gusts)
         steady = linalg.solve_continuous_lyapunov(A[own], -np.diag(intensity[gusts]))
         x[gusts] = _root(steady) @ rng.standard_normal((len(gusts), DRAWS))
-    deviation = np.asarray(result.details["noise_deviation"]) / np.sqrt(block)
+    means = maneuver.samples // block
+    share = np.mean(maneuver.sampled, axis=0) if maneuver.sampled is not None else np.ones(len(C))
+    counted = np.maximum(block * share, 1.0)
+    deviation = np.asarray(result.details["noise_deviation"]) / np.sqrt(counted)
     errors = rng.standard_normal((len(C), means, DRAWS)) * deviation[:, None, None]
     for k in range(means):
         errors[:, k] += C @ x

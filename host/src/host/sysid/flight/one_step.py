@@ -13,7 +13,7 @@ import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
 from host.sysid.estimators.gust_model import gust_model
-from host.sysid.estimators.innovations import PROCESS, innovations_of
+from host.sysid.estimators.innovations import PROCESS, Innovations, innovations_of
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
@@ -174,11 +174,11 @@ def _of_innovations(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim
 
     def residuals(model: LinearModel, bent: Trim, data: Sequence[Maneuver]) -> list[Array] | None:
         e = found.innovations(filtered(model, bent), data)
-        return None if e is None else _whitened(e, found.white)
+        return None if e is None else _whitened(e, found)
 
     return OneStep(
         residuals=residuals,
-        reference=_whitened(found.e, found.white),
+        reference=_whitened(found.e, found),
         slopes=[s.reshape(-1, s.shape[-1]) for s in found.sensitivities],
         columns=[every] * len(found.e),
         inverse=found.inverse,
@@ -188,8 +188,8 @@ def _of_innovations(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim
     )
 
 
-def _whitened(residuals: Sequence[Array], whiteners: Sequence[Array]) -> list[Array]:
-    return [(e @ W.T).ravel() for e, W in zip(residuals, whiteners, strict=True)]
+def _whitened(residuals: Sequence[Array], answer: Innovations) -> list[Array]:
+    return [answer.whiten(k, e).ravel() for k, e in enumerate(residuals)]
 
 
 def _of_outputs(result: FitResult, maneuvers: Sequence[Maneuver]) -> OneStep | None:

@@ -125,7 +125,7 @@ def largest_rms(
         means = slopes.shape[1]
         if process:
             block = block_length(maneuver.dt_s)
-            errors = random_errors(rng, model, result, process, maneuver.dt_s, block, means)
+            errors = random_errors(rng, model, result, process, maneuver, block)
         else:
             errors = scale[:, None, :] * np.stack(
                 [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -164,3 +165,8 @@ class Maneuver:
             outputs=cut[list(model.outputs)].to_numpy(dtype=np.float64),
             name=name,
         )
+
+
+def measurements(maneuvers: Sequence[Maneuver]) -> int:
+    """Return how many values of outputs were measured in all maneuvers."""
+    return sum(m.outputs.size if m.sampled is None else int(m.sampled.sum()) for m in maneuvers)

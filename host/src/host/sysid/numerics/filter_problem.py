@@ -16,6 +16,11 @@ from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.discretisation import discretise
+from host.sysid.numerics.intermittent_filter import (
+    FilterEquations,
+    IntermittentInnovations,
+    filter_intermittent,
+)
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.riccati import filter_innovations, predicted_covariance
 
@@ -30,6 +35,8 @@ class SteadyStateFilter:
     ----------
     F : Array, shape (n, n)
         State transition over a sample.
+    Q : Array, shape (n, n)
+        Covariance of the process noise of a sample.
     P : Array, shape (n, n)
         Covariance of the predicted state.
     S : Array, shape (p, p)
@@ -41,6 +48,7 @@ class SteadyStateFilter:
     """
 
     F: Array
+    Q: Array
     P: Array
     S: Array
     whitener: Array
@@ -54,11 +62,13 @@ class InnovationLikelihood:
     Attributes
     ----------
     z : list of Array
-        Per maneuver what `filter_innovations` returns.
+        Per maneuver what `filter_innovations` returns; empty where outputs are missing.
     e : list of Array, shape (samples, p)
-        Innovations per maneuver.
-    S : list of Array, shape (p, p)
-        Their covariance per maneuver.
+        Innovations per maneuver, zero where nothing was measured.
+    filters : list of SteadyStateFilter
+        Of each maneuver, all outputs measured.
+    intermittent : list of IntermittentInnovations or None
+        Of each maneuver some of whose outputs were not measured at every sample.
     gains : dict
         Filter of each sample period.
     cost : float
@@ -67,9 +77,22 @@ class InnovationLikelihood:
 
     z: list[Array]
     e: list[Array]
-    S: list[Array]
+    filters: list[SteadyStateFilter]
+    intermittent: list[IntermittentInnovations | None]
     gains: dict[float, SteadyStateFilter]  # per sample period
     cost: float
+
+    def uncorrelated(self, number: int) -> Array:
+        """Return innovations of a maneuver whose mixture `whitened` removes, (samples, p)."""
+        missing = self.intermittent[number]
+        return self.e[number] if missing is None else missing.independent
+
+    def whitened(self, number: int, innovations: Array) -> Array:
+        """Return innovations of a maneuver, those of `uncorrelated`, with unit variance."""
+        missing = self.intermittent[number]
+        if missing is None:
+            return np.asarray(innovations @ self.filters[number].whitener.T)
+        return np.asarray(innovations / np.sqrt(missing.variance))
 
 
 class FilterProblem:
@@ -114,12 +137,12 @@ class FilterProblem:
             *(f"log_process.{s}" for s in process),
             *(f"log_noise.{y}" for y in model.outputs),
         )
-        self._drives = []
+        self.drives = []
         for maneuver in maneuvers:
             columns = [maneuver.inputs, np.ones((maneuver.samples, 1))]
             if model.hold == "foh":
                 columns.append(np.diff(maneuver.inputs, axis=0, append=maneuver.inputs[-1:]))
-            self._drives.append(np.ascontiguousarray(np.hstack(columns)))
+            self.drives.append(np.ascontiguousarray(np.hstack(columns)))
 
     def noise(self, theta: Array) -> tuple[Array, Array]:
         """Return spectral density of every state's process noise and variance of every output."""
@@ -165,8 +188,7 @@ class FilterProblem:
             return None
         none = np.zeros(0, dtype=np.int64)
         gains: dict[float, SteadyStateFilter] = {}
-        likelihood = InnovationLikelihood([], [], [], gains, 0.0)
-        cost = 0.0
+        likelihood = InnovationLikelihood([], [], [], [], gains, 0.0)
         for number, maneuver in enumerate(self.maneuvers):
             rate, bias, start = self.constants(theta, number)
             AB[:, -1] = rate
@@ -180,22 +202,62 @@ class FilterProblem:
             if gain is None:
                 return None
             gains[period_s] = gains[maneuver.dt_s] = gain
-            finite, z = filter_innovations(
-                step, CD, gain.K, self._drives[number], maneuver.outputs, start, bias
-            )
-            if not finite:
+            likelihood.filters.append(gain)
+            run = self._intermittent if maneuver.held else self._steady
+            if not run(likelihood, step, CD, power, start, bias):
                 return None
-            likelihood.z.append(z)
-            likelihood.e.append(z[:, -len(C) :])
-            likelihood.S.append(gain.S)
-            white = likelihood.e[-1] @ gain.whitener.T
-            cost += 0.5 * float(np.sum(white**2))
-            cost -= len(z) * float(np.sum(np.log(np.diag(gain.whitener))))
         prior = self.output_problem.prior_precision
         deviation = theta[: self.n_model] - self.output_problem.prior_mean
-        cost += 0.5 * float(np.sum(prior * deviation**2))
-        likelihood.cost = cost
-        return likelihood if np.isfinite(cost) else None
+        likelihood.cost += 0.5 * float(np.sum(prior * deviation**2))
+        return likelihood if np.isfinite(likelihood.cost) else None
+
+    def _steady(
+        self,
+        likelihood: InnovationLikelihood,
+        step: Array,
+        CD: Array,
+        power: Array,
+        start: Array,
+        bias: Array,
+    ) -> bool:
+        """Add the next maneuver by the steady gain of its filter; return whether it is finite."""
+        number, gain = len(likelihood.e), likelihood.filters[-1]
+        measured = self.maneuvers[number].outputs
+        finite, z = filter_innovations(step, CD, gain.K, self.drives[number], measured, start, bias)
+        if not finite:
+            return False
+        likelihood.z.append(z)
+        likelihood.e.append(z[:, -len(power) :])
+        likelihood.intermittent.append(None)
+        white = likelihood.e[-1] @ gain.whitener.T
+        likelihood.cost += 0.5 * float(np.sum(white**2))
+        likelihood.cost -= len(z) * float(np.sum(np.log(np.diag(gain.whitener))))
+        return True
+
+    def _intermittent(
+        self,
+        likelihood: InnovationLikelihood,
+        step: Array,
+        CD: Array,
+        power: Array,
+        start: Array,
+        bias: Array,
+    ) -> bool:
+        """Add the next maneuver, outputs missing; it begins as if none had been before."""
+        number, gain = len(likelihood.e), likelihood.filters[-1]
+        found = filter_intermittent(
+            FilterEquations.of_values(step, CD, bias, gain.Q, power, start, gain.P),
+            self.drives[number],
+            self.maneuvers[number].outputs,
+            np.asarray(self.maneuvers[number].sampled),
+        )
+        if found is None:
+            return False
+        likelihood.z.append(np.zeros((0, 0)))
+        likelihood.e.append(found.e)
+        likelihood.intermittent.append(found)
+        likelihood.cost += found.cost
+        return True
 
 
 def _periods_s(steps_s: Sequence[float]) -> list[float]:
@@ -235,7 +297,7 @@ def steady_state_filter(
         if not solved:
             return None
         K = np.ascontiguousarray(np.linalg.solve(S, C @ P).T)
-        return SteadyStateFilter(F, P, S, np.linalg.inv(factor), K)
+        return SteadyStateFilter(F, Qd, P, S, np.linalg.inv(factor), K)
     except np.linalg.LinAlgError:
         return None
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.sysid.numerics.discretisation import discretise
+from host.sysid.identification_error import IdentificationError
 from host.sysid.numerics.filter_problem import (
     FilterProblem,
     InnovationLikelihood,
@@ -16,8 +16,12 @@ from host.sysid.numerics.filter_problem import (
 from host.sysid.numerics.filter_sensitivities import (
     GainSensitivities,
     gain_sensitivities,
+    intermittent_columns,
+    intermittent_innovations,
+    maneuver_sensitivities,
     matrix_sensitivities,
 )
+from host.sysid.numerics.intermittent_filter import IntermittentInnovations
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.recursion import propagate
 
@@ -53,6 +57,11 @@ def fisher_scoring(
     for number, maneuver in enumerate(problem.maneuvers):
         gain, by = point.gains[maneuver.dt_s], gains[maneuver.dt_s]
         active = _active(problem, number)
+        if point.intermittent[number] is not None:
+            information, gradient = _intermittent_scoring(problem, theta, number, gain, by)
+            parts.append(information)
+            scores.append(gradient)
+            continue
         J = _innovation_sensitivities(problem, theta, point, number, by, matrices)
         white = point.e[number] @ gain.whitener.T
         information, gradient = np.zeros((size, size)), np.zeros(size)
@@ -80,9 +89,14 @@ def whitened_innovation_sensitivities(
     found: list[Array] = []
     for number, (e, maneuver) in enumerate(zip(point.e, problem.maneuvers, strict=True)):
         slopes = np.zeros((e.size, len(theta)))
-        slopes[:, _active(problem, number)] = _innovation_sensitivities(
-            problem, theta, point, number, gains[maneuver.dt_s], matrices
-        )
+        gain, by = point.gains[maneuver.dt_s], gains[maneuver.dt_s]
+        if point.intermittent[number] is not None:
+            run, columns = _intermittent(problem, theta, number, gain, by)
+            slopes[:, columns] = run.by_independent.reshape(e.size, -1)
+        else:
+            slopes[:, _active(problem, number)] = _innovation_sensitivities(
+                problem, theta, point, number, by, matrices
+            )
         found.append(slopes.reshape(*e.shape, -1))
     return found
 
@@ -115,6 +129,47 @@ def _shared(problem: FilterProblem) -> IntArray:
     )
 
 
+def _intermittent(
+    problem: FilterProblem,
+    theta: Array,
+    number: int,
+    gain: SteadyStateFilter,
+    by: GainSensitivities,
+) -> tuple[IntermittentInnovations, IntArray]:
+    """Return innovations of a maneuver with missing outputs, and which unknowns their slopes are
+    by."""
+    run = intermittent_innovations(problem, theta, number, gain, by)
+    if run is None:  # it ran at this very point without slopes
+        raise IdentificationError(f"model {problem.model.name}: the Kalman filter has no slopes")
+    outputs, active = problem.output_problem, _active(problem, number)
+    return run, active[intermittent_columns(outputs.n_common, outputs.n_local, len(active))]
+
+
+def _intermittent_scoring(
+    problem: FilterProblem,
+    theta: Array,
+    number: int,
+    gain: SteadyStateFilter,
+    by: GainSensitivities,
+) -> tuple[Array, Array]:
+    """Return information and negative gradient of a maneuver with missing outputs.
+
+    Of an innovation w of variance s, given those before, the information is dw dw / s + ds ds /
+    (2 s^2).
+    """
+    run, columns = _intermittent(problem, theta, number, gain, by)
+    white = run.white.ravel()
+    J = run.by_independent.reshape(white.size, -1)
+    spread = run.by_variance.reshape(white.size, -1)
+    shared = columns[: spread.shape[1]]
+    information, gradient = np.zeros((len(theta), len(theta))), np.zeros(len(theta))
+    information[np.ix_(columns, columns)] = J.T @ J
+    information[np.ix_(shared, shared)] += 0.5 * spread.T @ spread
+    gradient[columns] = -(J.T @ white)
+    gradient[shared] -= 0.5 * spread.T @ (1.0 - white**2)
+    return information, gradient
+
+
 def _innovation_sensitivities(
     problem: FilterProblem,
     theta: Array,
@@ -126,38 +181,14 @@ def _innovation_sensitivities(
     """Return sensitivities of the whitened innovations, (samples x p, `_active`)."""
     _, CD, CD_slopes = matrices
     model, output_problem = problem.model, problem.output_problem
-    n, m, p = len(model.states), len(model.inputs), len(model.outputs)
+    n, p = len(model.states), len(model.outputs)
     gain: SteadyStateFilter = point.gains[problem.maneuvers[number].dt_s]
     common, local = output_problem.n_common, output_problem.n_local
     width = common + local + len(theta) - problem.n_model
     noise = slice(common + local, width)
-    A, B, _, _ = model.matrices(theta)
-    rate, _, _ = problem.constants(theta, number)
-    entries = model.entries("AB")
-    rates = np.array([model.states.index(s) for s in model.state_biases], dtype=np.int64)
-    step, step_slopes = discretise(
-        np.column_stack([A, B, rate]),
-        n,
-        m,
-        model.hold == "foh",
-        problem.maneuvers[number].dt_s,
-        np.concatenate([entries.row, rates]),
-        np.concatenate([entries.column, np.full(len(rates), n + m)]),
-        np.concatenate([entries.parameter, common + np.arange(len(rates))]),
-        np.concatenate([entries.gain, np.ones(len(rates))]),
-        common + len(rates),
-    )
-    w = step.shape[1] - n
-    rows_known = common + len(rates)
-    direct = np.zeros((n + w, p, width))
-    direct[: n + m, :, :common] = CD_slopes.transpose(1, 0, 2)
-    for k, output in enumerate(model.output_biases):
-        direct[n + m, model.outputs.index(output), rows_known + k] = 1.0
-    start = np.zeros((n, width))
-    for k, state in enumerate(model.initial_states):
-        start[model.states.index(state), rows_known + len(model.output_biases) + k] = 1.0
-    for state, name in model.shared_starts:
-        start[model.states.index(state), problem.names.index(name)] = 1.0
+    one = maneuver_sensitivities(problem, theta, number, CD_slopes)
+    step_slopes, direct = one.by_step, one.direct
+    w, rows_known = one.step.shape[1] - n, step_slopes.shape[2]
     drive = np.zeros((n + w + p, n, width))
     drive[: n + w, :, :rows_known] = step_slopes.transpose(1, 0, 2)
     FK = gain.F @ gain.K
@@ -168,7 +199,7 @@ def _innovation_sensitivities(
     z = point.z[number]
     out = np.empty((p, len(z), width))
     whitened_C = gain.whitener @ CD[:, :n]
-    propagate(gain.F - FK @ CD[:, :n], drive.transpose(1, 0, 2), z, whitened_C, start, out)
+    propagate(gain.F - FK @ CD[:, :n], drive.transpose(1, 0, 2), z, whitened_C, one.start, out)
     # Direct part at a fixed state; the rest comes through the state.
     known_state = -(gain.whitener @ direct).reshape(n + w, -1)
     slopes = (z[:, : n + w] @ known_state).reshape(len(z), p, width)

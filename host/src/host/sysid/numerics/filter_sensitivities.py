@@ -2,22 +2,52 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from host.arrays import Array
+from host.arrays import Array, IntArray
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.filter_problem import FilterProblem, SteadyStateFilter, van_loan
+from host.sysid.numerics.intermittent_filter import (
+    FilterEquations,
+    IntermittentInnovations,
+    filter_intermittent,
+)
 
 
 @dataclass(frozen=True, slots=True)
 class GainSensitivities:
-    """Derivatives of S (shared, p, p) and K (shared, n, p) by the unknowns all maneuvers share."""
+    """Derivatives of S (shared, p, p), K (shared, n, p), P and Q (shared, n, n) by the unknowns all
+    maneuvers share."""
 
     S: Array
     K: Array
+    P: Array
+    Q: Array
+
+
+@dataclass(frozen=True, slots=True)
+class ManeuverSensitivities:
+    """One sample of a maneuver by its unknowns: common, its constants, both kinds of noise.
+
+    Attributes
+    ----------
+    step : Array, shape (n, n + w)
+        [Phi Gamma].
+    by_step : Array, shape (n, n + w, known)
+        Its derivatives; none by the unknowns behind the rates.
+    direct : Array, shape (n + w, p, columns)
+        Derivatives of the outputs at a fixed state, by state and drive.
+    start : Array, shape (n, columns)
+        Of the initial state.
+    """
+
+    step: Array
+    by_step: Array
+    direct: Array
+    start: Array
 
 
 def matrix_sensitivities(model: LinearModel, theta: Array) -> tuple[Array, Array, Array]:
@@ -78,7 +108,87 @@ def gain_sensitivities(
     dS = across + across.transpose(0, 2, 1) + C @ dP @ C.T + dR
     inverse = gain.whitener.T @ gain.whitener
     dK = (dP @ C.T + gain.P @ dC.transpose(0, 2, 1) - gain.K @ dS) @ inverse
-    return GainSensitivities(dS, dK)
+    return GainSensitivities(dS, dK, dP, dQ)
+
+
+def maneuver_sensitivities(
+    problem: FilterProblem, theta: Array, number: int, CD_slopes: Array
+) -> ManeuverSensitivities:
+    """Return what one sample of a maneuver depends on; `CD_slopes` as `matrix_sensitivities`."""
+    model, outputs = problem.model, problem.output_problem
+    n, m, p = len(model.states), len(model.inputs), len(model.outputs)
+    common = outputs.n_common
+    width = common + outputs.n_local + len(theta) - problem.n_model
+    A, B, _, _ = model.matrices(theta)
+    rate, _, _ = problem.constants(theta, number)
+    entries = model.entries("AB")
+    rates = np.array([model.states.index(s) for s in model.state_biases], dtype=np.int64)
+    step, by_step = discretise(
+        np.column_stack([A, B, rate]),
+        n,
+        m,
+        model.hold == "foh",
+        problem.maneuvers[number].dt_s,
+        np.concatenate([entries.row, rates]),
+        np.concatenate([entries.column, np.full(len(rates), n + m)]),
+        np.concatenate([entries.parameter, common + np.arange(len(rates))]),
+        np.concatenate([entries.gain, np.ones(len(rates))]),
+        common + len(rates),
+    )
+    rows_known = common + len(rates)
+    direct = np.zeros((step.shape[1], p, width))
+    direct[: n + m, :, :common] = CD_slopes.transpose(1, 0, 2)
+    for k, output in enumerate(model.output_biases):
+        direct[n + m, model.outputs.index(output), rows_known + k] = 1.0
+    start = np.zeros((n, width))
+    for k, state in enumerate(model.initial_states):
+        start[model.states.index(state), rows_known + len(model.output_biases) + k] = 1.0
+    for state, name in model.shared_starts:
+        start[model.states.index(state), problem.names.index(name)] = 1.0
+    return ManeuverSensitivities(step, by_step, direct, start)
+
+
+def intermittent_innovations(
+    problem: FilterProblem,
+    theta: Array,
+    number: int,
+    gain: SteadyStateFilter,
+    by: GainSensitivities | None = None,
+) -> IntermittentInnovations | None:
+    """Run the filter of `intermittent_filter` over a maneuver with slopes; None if it fails.
+
+    Their columns are `intermittent_columns`; without sensitivities of the gain its constants alone.
+    """
+    maneuver, outputs = problem.maneuvers[number], problem.output_problem
+    if maneuver.sampled is None:
+        return None
+    _, CD, CD_slopes = matrix_sensitivities(problem.model, theta)
+    one = maneuver_sensitivities(problem, theta, number, CD_slopes)
+    common = outputs.n_common
+    columns = common + np.arange(outputs.n_local)
+    if by is not None:
+        columns = intermittent_columns(common, outputs.n_local, one.start.shape[1])
+    by_step = np.zeros((*one.step.shape, one.start.shape[1]))
+    by_step[:, :, : one.by_step.shape[2]] = one.by_step
+    _, bias, start = problem.constants(theta, number)
+    _, power = problem.noise(theta)
+    values = FilterEquations.of_values(one.step, CD, bias, gain.Q, power, start, gain.P)
+    slopes = replace(
+        values,
+        by_step=np.ascontiguousarray(by_step[:, :, columns]),
+        by_read=np.ascontiguousarray(one.direct.transpose(1, 0, 2)[:, :, columns]),
+        by_start=np.ascontiguousarray(one.start[:, columns]),
+    )
+    if by is not None:
+        Q_slopes, P_slopes = (np.ascontiguousarray(x.transpose(1, 2, 0)) for x in (by.Q, by.P))
+        slopes = replace(slopes, Q_slopes=Q_slopes, P_slopes=P_slopes)
+    return filter_intermittent(slopes, problem.drives[number], maneuver.outputs, maneuver.sampled)
+
+
+def intermittent_columns(common: int, local: int, width: int) -> IntArray:
+    """Return the unknowns of a maneuver, its own constants last: they move its states alone."""
+    constants = common + np.arange(local)
+    return np.concatenate([np.arange(common), np.arange(common + local, width), constants])
 
 
 def _noise_sensitivities(

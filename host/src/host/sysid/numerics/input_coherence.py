@@ -292,14 +292,15 @@ def block_length(dt_s: float, block_s: float = BLOCK_S) -> int:
 def block_means(values: Array, block: int, seen: BoolArray | None = None) -> Array:
     """Return the means of successive blocks of samples, (samples // block, columns).
 
-    Of those `seen` alone, (samples,), where it is given: of a sensor that is slower than the rows a
-    mean with what it did not measure as zero says a part of its noise. Zero where nothing was seen.
+    Of those `seen` alone, (samples,) or of each column, where it is given: of a sensor that is
+    slower than the rows a mean with what it did not measure as zero says a part of its noise. Zero
+    where nothing was seen.
     """
     count = len(values) // block
     blocks = values[: count * block].reshape(count, block, -1)
     if seen is None or block == 1:
         return np.asarray(blocks.mean(axis=1))
-    weight = seen[: count * block].reshape(count, block, 1)
+    weight = seen[: count * block].reshape(count, block, -1)
     return np.asarray((blocks * weight).sum(axis=1) / np.maximum(weight.sum(axis=1), 1))
 
 

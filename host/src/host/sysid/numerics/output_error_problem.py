@@ -204,6 +204,18 @@ class OutputProblem:
             result[missing] = 0.0
         return np.asarray(result)
 
+    def residual_deviation(self, residuals: Sequence[Array]) -> Array:
+        """Return the deviations of residuals of every maneuver, (p,); zeros of what was not
+        measured do not count."""
+        share = np.sqrt(self.samples / self.counts)
+        return np.asarray(np.maximum(share * np.std(np.hstack(residuals), axis=1), 1e-12))
+
+    def residual_covariance(self, residuals: Sequence[Array]) -> Array:
+        """Return the covariance of such residuals, (p, p)."""
+        scale = np.sqrt(self.samples / self.counts)
+        covariance = np.atleast_2d(np.cov(np.hstack(residuals)))
+        return np.asarray(covariance * np.outer(scale, scale), dtype=np.float64)
+
     def seen(self, maneuver: int, output: int) -> BoolArray | None:
         """Return at which samples of a maneuver an output was measured; None: at all."""
         missing = self._parts[maneuver].missing

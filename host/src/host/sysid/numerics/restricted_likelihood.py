@@ -20,6 +20,7 @@ from host.sysid.numerics.filter_problem import (
     SteadyStateFilter,
     steady_state_filter,
 )
+from host.sysid.numerics.filter_sensitivities import intermittent_innovations
 from host.sysid.numerics.information_inverse import LEAST_IDENTIFIED
 
 STEP_BOUNDS = 0.01  # of a Cramer-Rao bound: differences
@@ -60,16 +61,40 @@ def half_log_determinants(problem: FilterProblem, theta: Array) -> Array:
     model = problem.model
     A, _, C, _ = model.matrices(theta)
     intensity, power = problem.noise(theta)
-    records = list(zip(problem.periods_s, (m.samples for m in problem.maneuvers), strict=True))
-    found: dict[tuple[float, int], float] = {}
-    for period_s in set(problem.periods_s):
-        gain = steady_state_filter(A, C, intensity, np.diag(power), period_s)
-        if gain is None:
-            return np.full(len(records), np.nan)
-        response = _ConstantsResponse(model, A, C, gain, period_s)
-        lengths = {n for own_s, n in records if own_s == period_s}
-        found |= {(period_s, n): response.half_log_determinant(n) for n in lengths}
-    return np.array([found[record] for record in records])
+    found: list[float] = []
+    responses: dict[float, _ConstantsResponse] = {}
+    known: dict[tuple[float, int], float] = {}
+    for number, maneuver in enumerate(problem.maneuvers):
+        period_s, samples = problem.periods_s[number], maneuver.samples
+        if period_s not in responses:
+            gain = steady_state_filter(A, C, intensity, np.diag(power), period_s)
+            if gain is None:
+                return np.full(len(problem.maneuvers), np.nan)
+            responses[period_s] = _ConstantsResponse(model, A, C, gain, period_s)
+        response = responses[period_s]
+        if maneuver.held:
+            run = intermittent_innovations(problem, theta, number, response.gain)
+            J = np.zeros((1, 1)) if run is None else _flat(run.by_independent)
+            found.append(_half_log_determinant(J.T @ J))
+            continue
+        if (period_s, samples) not in known:
+            known[period_s, samples] = response.half_log_determinant(samples)
+        found.append(known[period_s, samples])
+    return np.array(found)
+
+
+def _flat(slopes: Array) -> Array:
+    return slopes.reshape(-1, slopes.shape[-1])
+
+
+def _half_log_determinant(information: Array) -> float:
+    scale = np.sqrt(np.diag(information))
+    if not np.all(scale > 0.0):
+        return np.nan
+    values = np.linalg.eigvalsh(information / np.outer(scale, scale))
+    if not values[0] > LEAST_IDENTIFIED * values[-1]:
+        return np.nan
+    return float(np.sum(np.log(scale)) + 0.5 * np.sum(np.log(values)))
 
 
 class _ConstantsResponse:
@@ -95,19 +120,14 @@ class _ConstantsResponse:
         start = np.zeros((size, biases + starts.shape[1]))
         start[n:, :biases] = np.eye(biases)
         start[:n, biases:] = starts
+        self.gain = gain
         self._start = start
         self._powers = [(output.T @ output, transition)]
 
     def half_log_determinant(self, samples: int) -> float:
         """Return half the log determinant of the constants' information in so many samples."""
         information = self._start.T @ self._information(samples) @ self._start
-        scale = np.sqrt(np.diag(information))
-        if not np.all(scale > 0.0):
-            return np.nan
-        values = np.linalg.eigvalsh(information / np.outer(scale, scale))
-        if not values[0] > LEAST_IDENTIFIED * values[-1]:
-            return np.nan
-        return float(np.sum(np.log(scale)) + 0.5 * np.sum(np.log(values)))
+        return _half_log_determinant(information)
 
     def _information(self, samples: int) -> Array:
         """Return the sum of squares of the outputs, by doubling the number of samples."""

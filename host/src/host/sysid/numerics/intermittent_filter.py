@@ -1,0 +1,327 @@
+"""A Kalman filter of a linear model whose outputs are measured at some of the samples only.
+
+An output that was not measured is left out of the measurement update, and the gain follows what
+was, whatever the pattern (Durbin & Koopman, Time Series Analysis by State Space Methods, 2nd ed.,
+sec. 4.10; Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 5). Outputs of an instant
+are taken one after another, which for uncorrelated noise is the same as all at once, and leaves
+innovations that are independent of each other (Anderson & Moore, Optimal Filtering, 1979, sec.
+6.4). Slopes by the unknowns run along. First come those that the covariance depends on, `shared` of
+them, the noise of each output last; then those of the states alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.arrays import Array, BoolArray
+from host.compiled import compiled, compiled_part, has_compiler
+from host.extras import install_hint
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.numerics.recursion import STATE_LIMIT
+
+SAMPLES_WITHOUT_COMPILER = 500  # of a filter that Python runs in minutes
+
+
+@dataclass(frozen=True, slots=True)
+class FilterEquations:
+    """A linear model over one sample, and its slopes by L unknowns, `shared` of them.
+
+    Attributes
+    ----------
+    step, by_step : Array, shape (n, n + w), (n, n + w, L)
+        [Phi Gamma]: the next state by state and drive.
+    read, by_read : Array, shape (p, n + w), (p, n + w, L)
+        Outputs by state and drive.
+    Q, Q_slopes : Array, shape (n, n), (n, n, shared)
+        Covariance of the process noise of a sample.
+    variance : Array, shape (p,)
+        Of the measurement noise.
+    start, by_start : Array, shape (n,), (n, L)
+        Predicted state of the first sample.
+    P, P_slopes : Array, shape (n, n), (n, n, shared)
+        Its covariance.
+    """
+
+    step: Array
+    by_step: Array
+    read: Array
+    by_read: Array
+    Q: Array
+    Q_slopes: Array
+    variance: Array
+    start: Array
+    by_start: Array
+    P: Array
+    P_slopes: Array
+
+    @classmethod
+    def of_values(
+        cls, step: Array, CD: Array, bias: Array, Q: Array, variance: Array, start: Array, P: Array
+    ) -> FilterEquations:
+        """Return equations without slopes; biases of the outputs act behind the inputs."""
+        n, wide = step.shape
+        read = np.zeros((len(CD), wide))
+        read[:, : CD.shape[1]], read[:, CD.shape[1]] = CD, bias
+        none = np.zeros((n, wide, 0))
+        by_read, square = np.zeros((*read.shape, 0)), np.zeros((n, n, 0))
+        return cls(
+            step, none, read, by_read, Q, square, variance, start, np.zeros((n, 0)), P, square
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class IntermittentInnovations:
+    """Innovations of one maneuver; of what was not measured they are zero, their variance one.
+
+    Attributes
+    ----------
+    e : Array, shape (samples, p)
+        Measured less predicted from the samples before.
+    independent, variance : Array, shape (samples, p)
+        Innovations given the outputs before in the same sample too, and their variance.
+    by_independent, by_variance : Array, shape (samples, p, L), (samples, p, shared)
+        Slopes of the innovations over their deviation, and of the variance over itself.
+    """
+
+    e: Array
+    independent: Array
+    variance: Array
+    by_independent: Array
+    by_variance: Array
+
+    @property
+    def white(self) -> Array:
+        """Innovations of unit variance, (samples, p)."""
+        return np.asarray(self.independent / np.sqrt(self.variance))
+
+    @property
+    def cost(self) -> float:
+        """Negative log likelihood, up to a constant."""
+        return 0.5 * float(np.sum(self.white**2 + np.log(self.variance)))
+
+
+def filter_intermittent(
+    equations: FilterEquations, drive: Array, measured: Array, sampled: BoolArray
+) -> IntermittentInnovations | None:
+    """Run the filter over one maneuver; None if it fails.
+
+    Parameters
+    ----------
+    equations : FilterEquations
+    drive : Array, shape (samples, w)
+    measured, sampled : Array, shape (samples, p)
+        What was measured, and whether.
+    """
+    q, size = equations, measured.shape
+    found = IntermittentInnovations(
+        np.zeros(size),
+        np.zeros(size),
+        np.ones(size),
+        np.zeros((*size, q.by_start.shape[1])),
+        np.zeros((*size, q.P_slopes.shape[2])),
+    )
+    done = _filter(
+        q.step, q.by_step, q.read, q.by_read, q.Q, q.Q_slopes, q.variance, q.start.copy(),
+        q.by_start.copy(), q.P.copy(), q.P_slopes.copy(), drive, measured,
+        np.ascontiguousarray(sampled), found.e, found.independent, found.variance,
+        found.by_independent, found.by_variance,
+    )  # fmt: skip
+    return found if done and np.isfinite(found.cost) else None
+
+
+def too_slow(maneuvers: Sequence[Maneuver]) -> str:
+    """Return why such a filter takes hours over these maneuvers; empty where it does not."""
+    samples = sum(m.samples for m in maneuvers if m.held)
+    if has_compiler() or samples <= SAMPLES_WITHOUT_COMPILER:
+        return ""
+    return (
+        f"a filter of columns with missing rows takes hours without numba: {install_hint('numba')}"
+    )
+
+
+@compiled_part
+def take_output(
+    x: Array,
+    by_x: Array,
+    P: Array,
+    P_slopes: Array,
+    h: Array,
+    by_h: Array,
+    left: float,
+    by_left: Array,
+    variance: float,
+    noise: int,
+    Ph: Array,
+    by_Ph: Array,
+    by_spread: Array,
+) -> float:
+    """Correct state and covariance by one output; return the variance of its innovation `left`.
+
+    `h` (n,) and `by_h` (n, L) are its row of C; column `noise` is the logarithm of its deviation.
+    `by_left` (L,) and `by_spread` (shared,) are overwritten by slopes over the deviation and over
+    the variance; `Ph` (n,) and `by_Ph` (n, shared) are work.
+    """
+    n, shared = len(x), P_slopes.shape[2]
+    spread = variance
+    for a in range(n):
+        Ph[a] = 0.0
+        for b in range(n):
+            Ph[a] += P[a, b] * h[b]
+        spread += h[a] * Ph[a]
+    if not spread > 0.0:
+        return spread
+    for q in range(shared):
+        by_spread[q] = 0.0
+    for a in range(n):
+        for q in range(shared):
+            by_Ph[a, q] = 0.0
+        for b in range(n):
+            for q in range(shared):
+                by_Ph[a, q] += P_slopes[a, b, q] * h[b] + P[a, b] * by_h[b, q]
+        for q in range(shared):
+            by_spread[q] += h[a] * by_Ph[a, q] + by_h[a, q] * Ph[a]
+    if shared:
+        by_spread[noise] += 2.0 * variance
+    for q in range(shared):
+        by_spread[q] /= spread
+    for a in range(n):
+        gain = Ph[a] / spread
+        x[a] += gain * left
+        for q in range(len(by_left)):
+            by_x[a, q] += gain * by_left[q]
+        for q in range(shared):
+            by_x[a, q] += (by_Ph[a, q] / spread - gain * by_spread[q]) * left
+        for b in range(n):
+            P[a, b] -= gain * Ph[b]
+            for q in range(shared):
+                P_slopes[a, b, q] -= (
+                    gain * by_Ph[b, q] + by_Ph[a, q] * Ph[b] / spread - gain * Ph[b] * by_spread[q]
+                )
+    for q in range(len(by_left)):
+        by_left[q] /= np.sqrt(spread)
+    return spread
+
+
+@compiled_part
+def covariance_ahead(
+    P: Array,
+    P_slopes: Array,
+    step: Array,
+    by_step: Array,
+    Q: Array,
+    Q_slopes: Array,
+    G: Array,
+    by_G: Array,
+) -> None:
+    """Overwrite P and its slopes by F P F' + Q; `G` (n, n) and `by_G` (n, n, shared) are work."""
+    n, shared = len(P), P_slopes.shape[2]
+    for i in range(
+        n
+    ):  # G = P F'; by_G = P_slopes F' / 2 + P by_F': F by_G and its transpose are all
+        for b in range(n):
+            G[i, b] = 0.0
+            for q in range(shared):
+                by_G[i, b, q] = 0.0
+            for c in range(n):
+                G[i, b] += P[i, c] * step[b, c]
+                half = 0.5 * step[b, c]
+                for q in range(shared):
+                    by_G[i, b, q] += half * P_slopes[i, c, q] + P[i, c] * by_step[b, c, q]
+    for a in range(n):
+        for b in range(n):
+            P[a, b] = Q[a, b]
+            for q in range(shared):
+                P_slopes[a, b, q] = Q_slopes[a, b, q]
+            for i in range(n):
+                P[a, b] += step[a, i] * G[i, b]
+                for q in range(shared):
+                    P_slopes[a, b, q] += step[a, i] * by_G[i, b, q] + step[b, i] * by_G[i, a, q]
+
+
+@compiled_part
+def state_ahead(x: Array, by_x: Array, step: Array, by_step: Array, z: Array, T: Array) -> None:
+    """Overwrite the state and its slopes by those of the next sample.
+
+    `z` (n + w,) has the drive behind the first n, which are overwritten; `T` (n, L) is work.
+    """
+    n, wide = step.shape
+    for i in range(n):
+        z[i] = x[i]
+        for q in range(T.shape[1]):
+            T[i, q] = by_x[i, q]
+    for i in range(n):
+        x[i] = 0.0
+        for q in range(T.shape[1]):
+            by_x[i, q] = 0.0
+        for c in range(wide):
+            x[i] += step[i, c] * z[c]
+            for q in range(T.shape[1]):
+                by_x[i, q] += by_step[i, c, q] * z[c]
+        for c in range(n):
+            for q in range(T.shape[1]):
+                by_x[i, q] += step[i, c] * T[c, q]
+
+
+@compiled
+def _filter(
+    step: Array,
+    by_step: Array,
+    read: Array,
+    by_read: Array,
+    Q: Array,
+    Q_slopes: Array,
+    variance: Array,
+    x: Array,
+    by_x: Array,
+    P: Array,
+    P_slopes: Array,
+    drive: Array,
+    measured: Array,
+    sampled: BoolArray,
+    e: Array,
+    independent: Array,
+    spread: Array,
+    by_independent: Array,
+    by_spread: Array,
+) -> bool:
+    """Filter one maneuver; return whether every state stayed below `STATE_LIMIT`."""
+    n, wide = step.shape
+    p, total, shared = len(variance), by_x.shape[1], P_slopes.shape[2]
+    z, T = np.zeros(wide), np.zeros((n, total))
+    Ph, by_Ph = np.zeros(n), np.zeros((n, shared))
+    G, by_G = np.zeros((n, n)), np.zeros((n, n, shared))
+    for k in range(len(drive)):
+        for i in range(n):
+            z[i] = x[i]
+            if not abs(x[i]) < STATE_LIMIT:
+                return False
+        z[n:] = drive[k]
+        for j in range(p):
+            if sampled[k, j]:
+                e[k, j] = measured[k, j]
+                for c in range(wide):
+                    e[k, j] -= read[j, c] * z[c]
+        for j in range(p):
+            if not sampled[k, j]:
+                continue
+            left, by_left = measured[k, j], by_independent[k, j]
+            for c in range(wide):
+                now = x[c] if c < n else z[c]
+                left -= read[j, c] * now
+                for q in range(total):
+                    by_left[q] -= by_read[j, c, q] * now
+                    if c < n:
+                        by_left[q] -= read[j, c] * by_x[c, q]
+            independent[k, j] = left
+            spread[k, j] = take_output(
+                x, by_x, P, P_slopes, read[j, :n], by_read[j, :n], left, by_left, variance[j],
+                shared - p + j, Ph, by_Ph, by_spread[k, j],
+            )  # fmt: skip
+            if not spread[k, j] > 0.0:
+                return False
+        state_ahead(x, by_x, step, by_step, z, T)
+        covariance_ahead(P, P_slopes, step, by_step, Q, Q_slopes, G, by_G)
+    return True

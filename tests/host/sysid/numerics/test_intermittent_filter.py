@@ -1,0 +1,212 @@
+"""A filter of outputs that are measured at some samples only, against the dense Gaussian."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from host.arrays import BoolArray
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.state_space_model import LinearModel, Parameter, Term
+from host.sysid.numerics.discretisation import discretise
+from host.sysid.numerics.filter_problem import FilterProblem, InnovationLikelihood, discrete_noise
+from host.sysid.numerics.filter_scoring import (
+    fisher_scoring,
+    total_information,
+    whitened_innovation_sensitivities,
+)
+from host.sysid.numerics.restricted_likelihood import half_log_determinants
+from scipy import stats
+
+DT_S, SAMPLES = 0.05, 40
+PROCESS = ("gust_rad",)
+
+
+def gusty_pitch() -> LinearModel:
+    """Return two states of pitch and a gust, three outputs of which one reads the input too."""
+    return LinearModel(
+        name="pitch in gusts",
+        states=("alpha_rad", "q_radps", "gust_rad"),
+        inputs=("elevator_rad",),
+        outputs=("alpha_rad", "q_radps", "az_mps2"),
+        A=np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, -1.5]]),
+        B=np.zeros((3, 1)),
+        C=np.array([[1.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]),
+        D=np.zeros((3, 1)),
+        terms=(
+            Term("A", 0, 0, "Z_alpha"),
+            Term("A", 0, 2, "Z_alpha"),
+            Term("A", 1, 0, "M_alpha"),
+            Term("A", 1, 2, "M_alpha"),
+            Term("A", 1, 1, "M_q"),
+            Term("B", 1, 0, "M_de"),
+            Term("C", 2, 0, "Z_alpha", 20.0),
+            Term("C", 2, 2, "Z_alpha", 20.0),
+        ),
+        parameters=(
+            Parameter("Z_alpha", -4.0),
+            Parameter("M_alpha", -25.0),
+            Parameter("M_q", -3.0),
+            Parameter("M_de", -30.0),
+        ),
+        state_biases=("q_radps",),
+        output_biases=("az_mps2",),
+        initial_states=("alpha_rad", "q_radps"),
+    )
+
+
+def sampled(kind: str) -> BoolArray:
+    """Return at which samples outputs were measured: each fifth of two of them, or any."""
+    if kind == "at random":
+        return np.random.default_rng(8).random((SAMPLES, 3)) > 0.6
+    rows = np.arange(SAMPLES)
+    return np.column_stack([rows % 5 == 2, np.ones(SAMPLES, bool), rows % 5 == 4])
+
+
+def problem_of(kind: str, *, more: tuple[Maneuver, ...] = ()) -> tuple[FilterProblem, np.ndarray]:
+    """Return a maneuver with missing outputs and unknowns away from any optimum."""
+    rng = np.random.default_rng(5)
+    inputs = 0.1 * np.sign(np.sin(0.7 * np.arange(SAMPLES)))[:, None]
+    outputs = rng.standard_normal((SAMPLES, 3)) * [0.03, 0.2, 1.5]
+    seen = sampled(kind)
+    outputs[~seen] = 1e6  # whatever stands there is not looked at
+    spoilt = Maneuver(DT_S, inputs, outputs, sampled=seen)
+    problem = FilterProblem(gusty_pitch(), [spoilt, *more], PROCESS)
+    theta = np.zeros(len(problem.output_problem.names))
+    theta[:8] = [*gusty_pitch().start, 0.05, -0.2, 0.02, -0.1]
+    return problem, np.concatenate([theta, np.log([0.08, 0.01, 0.03, 0.4])])
+
+
+def known(point: InnovationLikelihood | None) -> InnovationLikelihood:
+    """Return a point that must be there."""
+    assert point is not None
+    return point
+
+
+def next_state(problem: FilterProblem, theta: np.ndarray) -> np.ndarray:
+    """Return [Phi Gamma] of the first maneuver."""
+    A, B, _, _ = problem.model.matrices(theta)
+    rate, _, _ = problem.constants(theta, 0)
+    none = np.zeros(0, dtype=np.int64)
+    foh = problem.model.hold == "foh"
+    AB = np.column_stack([A, B, rate])
+    return discretise(AB, 3, 1, foh, DT_S, none, none, none, np.zeros(0), 0)[0]
+
+
+def dense_log_density(problem: FilterProblem, theta: np.ndarray) -> float:
+    """Return the log density of all that was measured, by its joint mean and covariance."""
+    model, maneuver = problem.model, problem.maneuvers[0]
+    A, _, C, D = model.matrices(theta)
+    _, bias, start = problem.constants(theta, 0)
+    intensity, power = problem.noise(theta)
+    steady = known(problem.evaluate(theta)).filters[0]
+    F, Q = discrete_noise(A, intensity, DT_S)
+    step, n = next_state(problem, theta), len(A)
+    mean, x = [], start
+    spread = np.zeros((SAMPLES * n, SAMPLES * n))
+    P = steady.P
+    for k in range(SAMPLES):
+        mean.append(C @ x + D @ maneuver.inputs[k] + bias)
+        cross = P
+        for later in range(k, SAMPLES):
+            spread[later * n : later * n + n, k * n : k * n + n] = cross
+            spread[k * n : k * n + n, later * n : later * n + n] = cross.T
+            cross = F @ cross
+        x, P = step @ np.concatenate([x, problem.drives[0][k]]), F @ P @ F.T + Q
+    rows = np.kron(np.eye(SAMPLES), C)
+    covariance = rows @ spread @ rows.T + np.diag(np.tile(power, SAMPLES))
+    seen = np.asarray(maneuver.sampled).ravel()
+    return float(
+        stats.multivariate_normal.logpdf(
+            maneuver.outputs.ravel()[seen],
+            np.concatenate(mean)[seen],
+            covariance[np.ix_(seen, seen)],
+        )
+    )
+
+
+@pytest.mark.parametrize("kind", ["each fifth", "at random"])
+def test_the_likelihood_is_that_of_the_joint_normal(kind: str) -> None:
+    problem, theta = problem_of(kind)
+    shifted = theta + 0.1
+    expected = [dense_log_density(problem, t) for t in (theta, shifted)]
+    found = [-known(problem.evaluate(t)).cost for t in (theta, shifted)]
+    count = int(sampled(kind).sum())
+    assert found[0] - 0.5 * count * np.log(2.0 * np.pi) == pytest.approx(expected[0], rel=1e-9)
+    assert found[1] - found[0] == pytest.approx(expected[1] - expected[0], rel=1e-8)
+
+
+def test_what_is_all_measured_is_the_steady_filter() -> None:
+    problem, theta = problem_of("each fifth")
+    whole = problem.maneuvers[0]
+    rng = np.random.default_rng(6)
+    whole = replace(whole, outputs=rng.standard_normal((SAMPLES, 3)), sampled=None)
+    # One value that comes behind the last sample that counts.
+    seen = np.ones((SAMPLES, 3), dtype=bool)
+    seen[-1, 0] = False
+    plain, late = (
+        known(FilterProblem(problem.model, [m], PROCESS).evaluate(theta))
+        for m in (whole, replace(whole, sampled=seen))
+    )
+    np.testing.assert_allclose(late.e[0][:-1], plain.e[0][:-1], rtol=1e-9, atol=1e-11)
+    white = plain.whitened(0, plain.uncorrelated(0))
+    np.testing.assert_allclose(
+        late.whitened(0, late.uncorrelated(0))[:-1], white[:-1], rtol=1e-7, atol=1e-9
+    )
+
+
+def test_gradient_and_slopes_are_those_of_differences() -> None:
+    whole = Maneuver(
+        DT_S, np.ones((SAMPLES, 1)), np.random.default_rng(7).standard_normal((SAMPLES, 3))
+    )
+    problem, theta = problem_of("at random", more=(whole,))
+    here = known(problem.evaluate(theta))
+    information, gradient = total_information(
+        problem.output_problem, theta, *fisher_scoring(problem, theta, here)
+    )
+    size = np.sqrt(np.diag(information))
+    exact = whitened_innovation_sensitivities(problem, theta, here)[0]
+    for k, name in enumerate(problem.names):
+        width = np.zeros(len(theta))
+        width[k] = 1e-4 / size[k]
+        up, down = (known(problem.evaluate(theta + s * width)) for s in (1.0, -1.0))
+        slope = (down.cost - up.cost) / (2.0 * width[k])
+        assert gradient[k] / size[k] == pytest.approx(slope / size[k], abs=1e-4), name
+        moved = (up.uncorrelated(0) - down.uncorrelated(0)) / (2.0 * width[k])
+        np.testing.assert_allclose(
+            exact[:, :, k] / size[k], here.whitened(0, moved) / size[k], atol=1e-6, err_msg=name
+        )
+
+
+def test_information_is_the_covariance_of_the_score() -> None:
+    """Over data that the model itself draws, outputs missing at random."""
+    problem, theta = problem_of("each fifth")
+    _, _, C, D = problem.model.matrices(theta)
+    _, bias, start = problem.constants(theta, 0)
+    _, power = problem.noise(theta)
+    steady = known(problem.evaluate(theta)).filters[0]
+    step = next_state(problem, theta)
+    rng, draws = np.random.default_rng(9), 400
+    root, kick = (np.linalg.cholesky(x + 1e-18 * np.eye(3)) for x in (steady.P, steady.Q))
+    scores, told = [], []
+    for _ in range(draws):
+        x, y = start + root @ rng.standard_normal(3), np.zeros((SAMPLES, 3))
+        for k, drive in enumerate(problem.drives[0]):
+            y[k] = C @ x + D @ drive[:1] + bias + np.sqrt(power) * rng.standard_normal(3)
+            x = step @ np.concatenate([x, drive]) + kick @ rng.standard_normal(3)
+        drawn = FilterProblem(problem.model, [replace(problem.maneuvers[0], outputs=y)], PROCESS)
+        point = known(drawn.evaluate(theta))
+        [information], [score] = fisher_scoring(drawn, theta, point)
+        scores.append(score)
+        told.append(information)
+    mean = np.mean(told, axis=0)
+    ratio = np.var(scores, axis=0) / np.diag(mean)
+    np.testing.assert_allclose(ratio, 1.0, atol=5.0 * np.sqrt(2.0 / draws))
+
+
+def test_constants_are_integrated_out_of_what_was_measured() -> None:
+    problem, theta = problem_of("each fifth")
+    found = half_log_determinants(problem, theta)
+    slopes = whitened_innovation_sensitivities(problem, theta, known(problem.evaluate(theta)))[0]
+    own = problem.output_problem.columns(0)[problem.output_problem.n_common :]
+    J = slopes[..., own].reshape(-1, len(own))
+    assert found[0] == pytest.approx(0.5 * np.linalg.slogdet(J.T @ J)[1], abs=1e-9)
