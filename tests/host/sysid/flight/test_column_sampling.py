@@ -177,6 +177,19 @@ def test_spoilt_columns_give_the_unspoilt_estimates() -> None:
     assert min(np.mean(x) for x in true.values()) > 0.84, true
 
 
+def test_a_slow_column_leaves_the_filter_in_gusts() -> None:
+    answer = host.identify(held(record(0)), models="longitudinal", stretches=[(4.0, 39.0)])
+    assert answer.linear[0].method == "filter-error-gust"
+    assert answer.linear[0].result.residual_kind == "innovation"
+
+
+def test_without_a_compiler_output_error_stands_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("host.sysid.numerics.intermittent_filter.has_compiler", lambda: False)
+    answer = host.identify(held(record(0)), models="longitudinal", stretches=[(4.0, 39.0)])
+    assert answer.linear[0].method == "output-error-white"
+    assert any("numba" in line for line in answer.linear[0].result.warnings)
+
+
 def test_intervals_hold_beside_a_clean_column() -> None:
     """Its information drowned that of all others: 73 to 93 % held, none of M_alpha's."""
     start = {name: 0.8 * value for name, value in TRUE.items()}

@@ -209,7 +209,8 @@ def even_grid(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
     if slower:
         notes.append(
             f"slower than the {dt_s:.3g} s of others, drawn between: {', '.join(slower)}; output"
-            " error compares at their own instants, all else takes what is drawn for measurements"
+            " and filter error compare at their own instants, all else takes what is drawn for"
+            " measurements"
         )
     if missing:
         length_s, at_s, _ = max(missing)

@@ -50,7 +50,12 @@ def rolling_gust_identifiable(maneuvers: Sequence[FlownManeuver]) -> bool:
 
 
 def with_filter_step(maneuvers: Sequence[FlownManeuver], model: LinearModel) -> list[FlownManeuver]:
-    """Return lateral maneuvers of our instrument as means over `STEP_S`, others as they are."""
+    """Return lateral maneuvers of our instrument as means over `STEP_S`, others as they are.
+
+    Those of a slow sensor stay too: a mean has what was not measured.
+    """
     if not feels_roll(model) or not sensors_known(maneuvers) or others_recorded(maneuvers):
+        return list(maneuvers)
+    if any(m.cut(model).held for m in maneuvers):
         return list(maneuvers)
     return [replace(m, block=max(1, round(STEP_S / m.dt_s))) for m in maneuvers]
