@@ -104,6 +104,25 @@ def test_the_likelihood_is_that_of_a_kalman_filter_written_with_matrices() -> No
     assert found.cost == pytest.approx(cost, rel=2e-4)
 
 
+@pytest.mark.parametrize(("decay", "variance"), [("2.0", 0.5**2 / 4.0), ("0.0", 0.0)])
+def test_the_air_moves_already_when_a_record_begins(decay: str, variance: float) -> None:
+    """What it does at the second sample is spread by what it was at the first."""
+    rates = {
+        "p_radps": "L_p*p_radps + gust_radps + L_da*aileron_rad",
+        "gust_radps": f"-{decay}*gust_radps",
+    }
+    model = equations(rates=rates, initial_states=["p_radps"])
+    y, u = np.full((8, 1), 0.3), np.zeros((8, 1))
+    problem = EquationFilterProblem(model, [Maneuver(0.01, u, y)], ("gust_radps",))
+    found = problem.evaluate(np.array([-4.0, 30.0, 0.0, np.log(0.5), np.log(0.1)]))
+    assert found is not None
+    F, Q = discrete_noise(
+        np.array([[-4.0, 1.0], [0.0, -float(decay)]]), np.array([0.0, 0.25]), 0.01
+    )
+    expected = (F @ np.diag([0.0, variance]) @ F.T + Q)[0, 0] + 0.1**2
+    assert found.power[0][1, 0] == pytest.approx(expected, rel=1e-6)
+
+
 def test_filter_error_of_linear_equations_is_that_of_the_linear_model() -> None:
     data = [rolled()]
     plain = fit("filter-error", model_from(LINEAR_ROLL), data, compare_noise=False)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import linalg, special
+from scipy import special
 
 from host.arrays import Array
 from host.sysid.estimators.coherence_inflation import NoiseExcess
@@ -21,7 +21,7 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.ar_noise import ArNoise, fit_ar, lagged_moments
-from host.sysid.numerics.filter_problem import discrete_noise
+from host.sysid.numerics.filter_problem import air_states, discrete_noise, steady_covariance
 from host.sysid.numerics.input_coherence import (
     HIGHEST_ORDER,
     block_length,
@@ -131,11 +131,9 @@ def random_errors(
     F, covariance = discrete_noise(A, intensity, block * maneuver.dt_s)
     root = _root(covariance)
     x = np.zeros((len(A), DRAWS))
-    gusts = [k for k, s in enumerate(wide.states) if s.startswith("gust")]
-    if gusts:  # the air moves already when the record begins
-        own = np.ix_(gusts, gusts)
-        steady = linalg.solve_continuous_lyapunov(A[own], -np.diag(intensity[gusts]))
-        x[gusts] = _root(steady) @ rng.standard_normal((len(gusts), DRAWS))
+    air = air_states(wide.states)
+    steady = steady_covariance(A[np.ix_(air, air)], intensity[air])
+    x[air] = _root(steady) @ rng.standard_normal((len(air), DRAWS))
     means = maneuver.samples // block
     share = np.mean(maneuver.sampled, axis=0) if maneuver.sampled is not None else np.ones(len(C))
     counted = np.maximum(block * share, 1.0)

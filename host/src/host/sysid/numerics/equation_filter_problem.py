@@ -19,7 +19,8 @@ from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.numerics.equation_filter import filter_equations
-from host.sysid.numerics.nonlinear_problem import NonlinearProblem, finite
+from host.sysid.numerics.filter_problem import air_states, steady_covariance
+from host.sysid.numerics.nonlinear_problem import Given, NonlinearProblem, finite
 
 STEP_BOUNDS = 1e-4  # of a bound: differences
 LOG_STEP = 1e-5  # of a logarithm of a deviation
@@ -194,8 +195,8 @@ class EquationFilterProblem:
         delay_s = np.array([0.0 if k < 0 else theta[k] for k in self._late])
         no_limit = np.full(n, np.inf)
         if not finite(
-            self._run, g.start.copy(), np.zeros((n, n)), -no_limit, no_limit, intensity, variance,
-            g.inputs, maneuver.outputs, seen, g.parameters,
+            self._run, g.start.copy(), self._first_covariance(g, intensity), -no_limit, no_limit,
+            intensity, variance, g.inputs, maneuver.outputs, seen, g.parameters,
             np.full(len(g.parameters), -1, dtype=np.int64), problem.constants, problem.tables,
             g.bias, none[:n], problem.output_offsets(g.local), none[:outputs], delay_s,
             none[:outputs], self._leader, maneuver.dt_s,
@@ -203,6 +204,26 @@ class EquationFilterProblem:
         ):  # fmt: skip
             return None
         return (e, white, power) if np.isfinite(e).all() and np.isfinite(white).all() else None
+
+    def _first_covariance(self, g: Given, intensity: Array) -> Array:
+        """Return the covariance of the states at the first sample: of air without a start."""
+        source, states = self.model.source, self.model.states
+        n, m = len(states), g.inputs.shape[1]
+        result, f, A = np.zeros((n, n)), np.zeros(n), np.zeros((n, n))
+        air = [k for k in air_states(states) if states[k] not in self.model.initial_states]
+        if not air:
+            return result
+        by_input, by_parameter = np.zeros((n, m)), np.zeros((n, len(g.parameters)))
+        values = (g.parameters, source.constant_values, source.table_values)
+        try:
+            source.code.functions["rate_slopes"](
+                g.start, g.inputs[0], *values, f, A, by_input, by_parameter
+            )
+            own = np.ix_(air, air)
+            result[own] = steady_covariance(A[own], intensity[air])
+        except (ArithmeticError, ValueError):  # no finite slope: the filter says so itself
+            pass
+        return result
 
     def _substeps(self, dt_s: float) -> int:
         most = 1 if dt_s <= QUICK_S else MOST_FILTER_STEPS

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import linalg
 
 from host.arrays import Array
 from host.sysid.identification_error import IdentificationError
@@ -300,6 +301,26 @@ def steady_state_filter(
         return SteadyStateFilter(F, Qd, P, S, np.linalg.inv(factor), K)
     except np.linalg.LinAlgError:
         return None
+
+
+def air_states(states: Sequence[str]) -> list[int]:
+    """Return which states are air, which moves already when a record begins: ``gust...``."""
+    return [k for k, name in enumerate(states) if name.startswith("gust")]
+
+
+def steady_covariance(A: Array, intensity: Array) -> Array:
+    """Return the covariance that white process noise sustains; zero of states that do not decay.
+
+    Parameters
+    ----------
+    A : Array, shape (n, n)
+    intensity : Array, shape (n,)
+        Spectral density of the noise in each rate.
+    """
+    if not len(A) or np.max(np.linalg.eigvals(A).real) >= 0.0:
+        return np.zeros_like(A)
+    # A P + P A' + Q = 0 (Bryson & Ho, Applied Optimal Control, sec. 11.4).
+    return np.asarray(linalg.solve_continuous_lyapunov(A, -np.diag(intensity)))
 
 
 def discrete_noise(A: Array, intensity: Array, dt_s: float) -> tuple[Array, Array]:
