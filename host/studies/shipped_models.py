@@ -76,6 +76,7 @@ def shipped(name: str, flight: VirtualFlight) -> NonlinearModel:
     known = asdict(airframe_data(AIRCRAFT)) | {
         "density_kgpm3": airborne(flight)["density_kgpm3"].mean(),
         "alpha_ref_rad": np.mean([m["condition"]["alpha_rad"] for m in of_axes(flight, "lateral")]),
+        "gust_length_m": flight.record.card.flight.height_m,
         "alpha_low_rad": table[0],
         "alpha_high_rad": table[-1],
         "spin_kgm2ps": engine.rotor_kgm2 * airborne(flight)["rotor_radps"].mean(),

@@ -34,7 +34,7 @@ def test_constants_are_those_of_the_aircraft_and_the_flight(name: str) -> None:
         table=pd.DataFrame({"t_s": [9.0], "density_kgpm3": [1.1], "rotor_radps": [800.0]}),
         maneuvers=[{"axes": ["aileron"], "condition": {"alpha_rad": 0.12}}],
         record=SimpleNamespace(
-            card=SimpleNamespace(flight=SimpleNamespace(ground_s=1.0)),
+            card=SimpleNamespace(flight=SimpleNamespace(ground_s=1.0, height_m=90.0)),
             frame=SimpleNamespace(alpha_nodes_rad=[0.08, 0.11]),
         ),
     )
@@ -42,7 +42,7 @@ def test_constants_are_those_of_the_aircraft_and_the_flight(name: str) -> None:
     known = {
         "density_kgpm3": 1.1, "mass_kg": 1.793, "spin_kgm2ps": 800.0 * 1.2991e-4,
         "alpha_ref_rad": 0.12, "thrust_pitch_rad": -0.0523599, "thrust_arm_m": -0.01554,
-        "alpha_low_rad": 0.08, "alpha_high_rad": 0.11,
+        "alpha_low_rad": 0.08, "alpha_high_rad": 0.11, "gust_length_m": 90.0,
     }  # fmt: skip
     for constant, value in known.items():
         assert constants.get(constant, value) == pytest.approx(value, rel=1e-3), constant

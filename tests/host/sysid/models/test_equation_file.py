@@ -107,6 +107,14 @@ def test_what_is_written_is_read_again(tmp_path: Path) -> None:
     assert equation_text(again) == equation_text(model)
 
 
+def test_inputs_between_samples_are_what_the_file_says(tmp_path: Path) -> None:
+    """Measured columns have noise: they stay as they are."""
+    smooth = read(tmp_path, 'hold = "smooth"\n' + TEXT)
+    assert smooth.smooth_inputs() == ("elevator_rad",)
+    assert read(tmp_path, equation_text(smooth)).smooth_inputs() == ("elevator_rad",)
+    assert read(tmp_path, TEXT).smooth_inputs() == ()
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
@@ -124,6 +132,7 @@ def test_what_is_written_is_read_again(tmp_path: Path) -> None:
         ('q_radps = "0.1*', 'q_radps = "Mq*', "line 25: starts.q_radps: column 1: 'Mq' is no"),
         ('kind = "equations"', 'kind = "equations"\nrow = 1', ": unknown key row"),
         ("[outputs]", "[readings]", ": unknown key readings"),
+        ("[constants]", 'hold = "cubic"\n[constants]', "hold: 'cubic', use zoh, foh, smooth"),
         ("M0 = { each_record = true }", "M0 = { each_record = 3 }", "line 20: parameters.M0:"),
     ],
 )

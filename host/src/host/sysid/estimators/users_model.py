@@ -120,7 +120,8 @@ def fit_by_evidence(
         line = "noise chosen by the data: white, it has no memory"
         return UsersFit(WHITE, named, plain.maneuvers, remarks=(line,))
     why = no_filter(model, maneuvers)
-    work = sum(m.samples for m in maneuvers) * len(plain.result.estimate) * (1 + len(model.delays))
+    late = sum(bool({*d.outputs} & {*model.outputs}) for d in model.delays)  # inputs cost nothing
+    work = sum(m.samples for m in maneuvers) * len(plain.result.estimate) * (1 + late)
     if not why and isinstance(model, NonlinearModel) and work > MOST_WORK:
         why = f"that would take many minutes; --method {FILTER} does it"
     if why:

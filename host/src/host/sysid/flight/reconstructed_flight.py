@@ -31,7 +31,7 @@ from host.sysid.compatibility.sensor_corrections import (
 from host.sysid.compatibility.sensor_dynamics import columns_at_cg
 from host.sysid.flight.column_sampling import sampled_name
 from host.sysid.flight.data_finding import Finding
-from host.sysid.flight.input_kinks import with_means_of_motion
+from host.sysid.flight.input_kinks import with_means_of_motion, with_means_of_smooth_motion
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
@@ -143,6 +143,7 @@ class FlownManeuver:
             )
         cut = self.inside()
         cut[CONSTANT] = np.ones(len(cut["t_s"]))
+        cut |= {c: with_means_of_smooth_motion(cut[c]) for c in model.smooth_inputs()}
         return Maneuver(
             dt_s=float(cut["t_s"][1] - cut["t_s"][0]),
             inputs=np.column_stack([cut[c] for c in model.inputs]),

@@ -25,6 +25,7 @@ q_radps = "q_radps"
 
 `initial_states`, `state_biases`, `output_biases`, `noise`, `delays` and `hold` as of linear models
 (`model_file.py`); left out, all initial states are free, and no bias. A delay may be of inputs.
+`hold = "smooth"`: between samples the inputs move as a servo does, not along lines.
 """
 
 from __future__ import annotations
@@ -47,6 +48,8 @@ from host.sysid.models.state_space_model import DelayGroup, Parameter
 from host.text import shown as in_a_line
 
 KIND = "equations"
+LINE, SMOOTH = "foh", "smooth"  # inputs between samples
+HOLDS = ("zoh", LINE, SMOOTH)
 KEYS = (
     "kind", "name", "about", "inputs", "columns", "hold", "constants", "definitions", "rates",
     "outputs", "parameters", "tables", "starts", "initial_states", "state_biases", "output_biases",
@@ -142,6 +145,9 @@ def equations_from(document: Mapping[str, object], name: str = "model") -> Nonli
     equations.text()  # what is too large with its slopes is refused now
     equations.first_states(dict.fromkeys((*equations.inputs, *outputs), 1.0))
     zero = no_tangent(equations)
+    hold = str(document.get("hold", LINE))
+    if hold not in HOLDS:
+        raise IdentificationError(f"hold: {shown(hold)}, use {', '.join(HOLDS)}")
     return NonlinearModel(
         equations=equations,
         own_parameters=own,
@@ -161,7 +167,8 @@ def equations_from(document: Mapping[str, object], name: str = "model") -> Nonli
         shared_starts=initial.shared,
         known_noise=read_noise(document.get("noise", {}), outputs, "noise"),
         delays=_delays(document, [p.name for p in (*parameters, *own)]),
-        hold=str(document.get("hold", "foh")),
+        hold=LINE if hold == SMOOTH else hold,
+        smooth=hold == SMOOTH,
         process_noise=_process_noise(document, states, nodes, equations.parameters),
     )
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from host.export.toml import toml_number, toml_value
-from host.sysid.models.equation_file import KIND
+from host.sysid.models.equation_file import KIND, SMOOTH
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.model_constants import OWN
 from host.sysid.models.nonlinear_model import NonlinearModel
@@ -29,7 +29,7 @@ def equation_text(model: NonlinearModel, result: FitResult | None = None) -> str
         f"name = {toml_value(model.name)}",
         f"inputs = {toml_value(e.inputs[: e.controls])}",
         f"columns = {toml_value(e.inputs[e.controls :])}",
-        f'hold = "{model.hold}"',
+        f'hold = "{SMOOTH if model.smooth else model.hold}"',
         f"initial_states = {_starts(model)}",
         f"state_biases = {toml_value(model.state_biases)}",
         f"output_biases = {toml_value(model.output_biases)}",

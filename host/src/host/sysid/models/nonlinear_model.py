@@ -173,12 +173,15 @@ class NonlinearModel(LinearModel):
         States whose equation process noise drives, for filters.
     frozen : tuple of (str, float)
         Parameters that are known by now.
+    smooth : bool
+        Controls move smoothly between samples, which lines with the mean of that motion stand for.
     """
 
     equations: Equations | None = None
     own_parameters: tuple[Parameter, ...] = ()
     process_noise: tuple[str, ...] = ()
     frozen: tuple[tuple[str, float], ...] = ()
+    smooth: bool = False
 
     @property
     def source(self) -> Equations:
@@ -203,6 +206,10 @@ class NonlinearModel(LinearModel):
     def controls(self) -> tuple[str, ...]:
         """Return the inputs that a pilot moves; measured columns follow the air as outputs do."""
         return self.inputs[: self.source.controls]
+
+    def smooth_inputs(self) -> tuple[str, ...]:
+        """Return the inputs that move smoothly between samples: controls, if the model says so."""
+        return self.controls() if self.smooth else ()
 
     def delayed_signals(self) -> tuple[str, ...]:
         """Return the signals that may be delayed: inputs too."""

@@ -238,6 +238,10 @@ class LinearModel:
         """Return the inputs that a pilot moves."""
         return self.inputs
 
+    def smooth_inputs(self) -> tuple[str, ...]:
+        """Return the inputs that move smoothly between samples: none, they are held or on lines."""
+        return ()
+
     def delayed_signals(self) -> tuple[str, ...]:
         """Return the signals that may be delayed."""
         return self.outputs
