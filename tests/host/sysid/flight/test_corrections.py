@@ -22,7 +22,11 @@ from host.sysid.answer.estimate_lines import model_lines
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.answer.verdict import verdict_lines
 from host.sysid.compatibility.path_preparation import density_share
-from host.sysid.compatibility.reconstruction import Compatibility, SensorErrorEstimate
+from host.sysid.compatibility.reconstruction import (
+    Compatibility,
+    NoAgreementError,
+    SensorErrorEstimate,
+)
 from host.sysid.compatibility.sensor_corrections import (
     INSTANTANEOUS_ERRORS,
     advance_delayed,
@@ -38,7 +42,9 @@ from host.sysid.flight.systematic_errors import add_systematic_covariance, syste
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.models.templates import Trim, template
 from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.pipeline import flight_preparation
 
+import host
 from tests.host.sysid import recorded
 from tests.host.sysid.recorded import NAME, Columns
 
@@ -152,6 +158,29 @@ def test_pressure_and_density_are_as_open_as_their_files_leave_them() -> None:
     assert open_share("qbar_pa") == pytest.approx(pitot, rel=0.02)
     assert open_share("density_kgpm3") == pytest.approx(density, rel=0.02)
     assert open_share("airspeed_mps", "airspeed_mps") == pytest.approx(together, rel=0.02)
+
+
+def test_sensors_that_do_not_agree_are_as_open_as_their_file_leaves_them(
+    flown: tuple[Columns, list[dict[str, Any]], Compatibility], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Vanes and pots were in no interval of a flight whose check did not converge."""
+
+    def disagree(*_: object) -> Compatibility:
+        raise NoAgreementError("data compatibility: no agreement")
+
+    monkeypatch.setattr(flight_preparation, "reconstruct", disagree)
+    flight = pd.DataFrame(flown[0])
+    found = host.identify(flight, aircraft=NAME, models=("short-period",))
+    parts, instrument = found.linear[0].coefficient_parts, found.flights[0].instrument
+    assert parts is not None
+    assert instrument is not None
+    sensed = dict(parts.sensed)
+    share = instrument.errors["pot_scale"].of_mean("pot_elevator")
+    k = parts.names.index("Cm_de")
+    values = dict(zip(parts.names, parts.values, strict=True))
+    assert abs(sensed["elevator_scale"][k] / values["Cm_de"]) == pytest.approx(share, rel=0.05)
+    assert {"alpha_scale", "gyro_scale_y", "imu_x_m"} <= sensed.keys()
+    assert not {"vane_delay_s", "imu_delay_s", "pitot_delay_s"} & sensed.keys()
 
 
 def test_a_late_vane_is_read_later() -> None:

@@ -53,6 +53,7 @@ REASONS_NO_GPS = {
     "gps_delay_s": "no GPS",
 }
 BY_FILE = "the aircraft file tells it better"
+NO_AGREEMENT = "the sensors did not agree; the calibration stands"
 NOT_EXCITED = "the motion flown does not show it; the calibration stands"
 NOT_EXCITED_NO_GPS = "not told from attitude and gusts without GPS; the calibration stands"
 
@@ -190,6 +191,20 @@ def reconstruct(
         for name, q in zip(problem.model.outputs, squares, strict=True)
     }
     return Compatibility(tuple(findings), rms, when, gps, instrument, tests, vanes)
+
+
+def by_calibration_alone(instrument: SensorErrorModel) -> Compatibility:
+    """Return a check that tells nothing: each error is as open as its calibration leaves it.
+
+    It stands where sensors came to no agreement. Pots and vanes were in no interval there.
+    """
+    findings = (
+        SensorErrorEstimate(
+            name, mean, NORMAL_95 * sd, NORMAL_95 * sd, data_informed=False, reason=NO_AGREEMENT
+        )
+        for name, (mean, sd) in prior(instrument).items()
+    )
+    return Compatibility(tuple(findings), {}, (), gps=False, instrument=instrument)
 
 
 def _beside_imu(

@@ -12,7 +12,7 @@ from host.sysid.aerodynamics.coefficient_table import (
     coefficient_parts,
 )
 from host.sysid.aerodynamics.path_thrust import path_thrust
-from host.sysid.compatibility.sensor_dynamics import IMU_DELAY, SERVO_DELAY
+from host.sysid.compatibility.sensor_dynamics import DELAYED_COLUMNS, IMU_DELAY, SERVO_DELAY
 from host.sysid.estimators.coherence_inflation import inflate_by_coherence, widened_to
 from host.sysid.estimators.gust_penetration import with_unknown_roll_lag
 from host.sysid.estimators.missing_control import missing_control, widened_by_missing_control
@@ -106,13 +106,14 @@ def _shifts(
 ) -> tuple[ShiftedEstimate, ...]:
     """Return the estimate moved by one deviation of every systematic error."""
     shifts: tuple[ShiftedEstimate, ...] = () if e.departure is None else e.departure.remainders
-    carriers = [m.flight.compatibility for m in e.used]
+    carriers = [m.flight.compatibility or m.flight.calibration_alone for m in e.used]
     known = [c for c in carriers if c is not None]
     if len(known) == len(carriers):
         moved = systematic_error_shifts(statistical, e.maneuvers, e.cuts, known, e.trim)
         # Of servos that were estimated the covariance has what they leave open, and the IMU's
         # delay with it: all outputs later are all inputs earlier.
-        estimated = () if e.servo is None else (SERVO_DELAY, IMU_DELAY)
+        estimated = {SERVO_DELAY, IMU_DELAY} if e.servo is not None else set()
+        estimated |= DELAYED_COLUMNS.keys() if e.delays else set()
         shifts += tuple(s for s in moved if s.error not in estimated)
     if airframe is None:
         first = e.used[0].flight

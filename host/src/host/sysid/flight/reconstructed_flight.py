@@ -69,6 +69,8 @@ class ReconstructedFlight:
         Who recorded it, as `Recording.maker` says: our logger, an autopilot, or others.
     errors : InstrumentErrors or None
         Of its sensors, where a calibration says better than what is usual of the maker's.
+    calibration_alone : Compatibility or None
+        Of sensors that came to no agreement: all that their calibration leaves open.
     """
 
     source: str
@@ -85,6 +87,7 @@ class ReconstructedFlight:
     angles: FlowAngles | None = None
     maker: str = OWN
     errors: InstrumentErrors | None = None
+    calibration_alone: Compatibility | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ from host.sysid.compatibility.ground_attitude import update_by_standstill
 from host.sysid.compatibility.reconstruction import (
     Compatibility,
     NoAgreementError,
+    by_calibration_alone,
     reconstruct,
 )
 from host.sysid.compatibility.sensor_corrections import without_estimated_delays
@@ -91,7 +92,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         findings += small
     # A law is seen in commands: a servo moves the surface later and slower.
     findings += feedback_findings({**columns, **commands}, found)
-    agreement = None
+    agreement = calibration_alone = None
     try:
         agreement = reconstruct(columns, known.airframe if known else None, instrument, sensors)
         agreement = agreement if how.delays else without_estimated_delays(agreement)
@@ -101,6 +102,8 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         findings += calibration_findings(agreement)
     except NoAgreementError as error:
         findings.append(disagreement(error, columns))
+        if instrument is not None and how.corrections:
+            calibration_alone = by_calibration_alone(instrument)
     except IdentificationError as error:
         notes.append(str(error))
         findings += [no_instrument_errors_finding(columns)] if read.shares else []
@@ -133,6 +136,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         servo=servo_prior(sensors) if commands and how.delays else None,
         angles=angles,
         errors=sensors.errors,
+        calibration_alone=calibration_alone,
     )
     return PreparedFlight(flight, agreement, tuple(notes))
 
