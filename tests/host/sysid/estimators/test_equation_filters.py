@@ -14,6 +14,7 @@ from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.numerics.equation_filter_problem import EquationFilterProblem
 from host.sysid.numerics.filter_problem import discrete_noise
 from scipy import linalg
+from scipy.signal import lfilter
 
 DT_S, SAMPLES = 0.05, 50
 ROLL = {
@@ -63,6 +64,25 @@ def rolled(late: int = 0, moved: float = 0.3) -> Maneuver:
         p[k + 1] = F * p[k] + (1.0 - F) * 8.0 * held + moved * np.sqrt(DT_S) * rng.standard_normal()
     p = np.concatenate([np.zeros(late), p[: SAMPLES - late]])
     return Maneuver(DT_S, u[:, None], (p + 0.02 * rng.standard_normal(SAMPLES))[:, None])
+
+
+def served(late_s: float) -> Maneuver:
+    """Return a record of roll rate and its slope in calm air, the servo late."""
+    rng = np.random.default_rng(0)
+    fine = 20
+    h = DT_S / fine
+    time_s = h * np.arange(SAMPLES * fine)
+
+    def stick(at_s: Array) -> Array:
+        moving_s = np.maximum(at_s, 0.0)
+        return 0.1 * np.sin(2.5 * moving_s) ** 3 + 0.03 * np.sin(5.0 * moving_s) ** 3
+
+    surface = stick(time_s - late_s)
+    F = np.exp(-5.0 * h)
+    p = lfilter([0.0, 4.0 * (1.0 - F)], [1.0, -F], surface + np.append(surface[1:], 0.0))
+    y = np.stack([p, 40.0 * surface - 5.0 * p], axis=1)[::fine]
+    y += np.array([0.01, 0.05]) * rng.standard_normal(y.shape)
+    return Maneuver(DT_S, stick(time_s[::fine])[:, None], y)
 
 
 def equations(**changed: object) -> NonlinearModel:
@@ -158,6 +178,21 @@ def test_a_delay_and_a_prior_and_a_bound_are_taken_by_the_extended_filter() -> N
     assert held.value("L_p") >= -4.5
 
 
+@pytest.mark.parametrize("late_s", [0.0, 0.015])
+def test_a_late_servo_is_found_by_the_extended_filter_as_by_output_error(late_s: float) -> None:
+    """It is in the rates and in an output that the surface drives at once."""
+    outputs = {"p_radps": "p_radps", "p_dot_radps2": "L_p*p_radps + L_da*aileron_rad"}
+    delays = [{"name": "servo_s", "outputs": ["aileron_rad"], "prior_sd_s": 0.02, "limit_s": 0.2}]
+    model = equations(outputs=outputs, delays=delays)
+    found = fit("extended-kalman", model, [served(late_s)])
+    peer = fit("output-error-white", model, [served(late_s)])
+    half_width_s = found.half_width()[found.index("servo_s")]
+    assert half_width_s < 0.005
+    assert abs(found.value("servo_s") - late_s) < half_width_s
+    assert abs(found.value("servo_s") - peer.value("servo_s")) < half_width_s
+    assert half_width_s == pytest.approx(peer.half_width()[peer.index("servo_s")], rel=0.3)
+
+
 def test_filter_error_takes_delays_of_outputs_and_inputs() -> None:
     """The gyro or the servo two samples late: the filter's own delays, no data are shifted."""
     data = rolled(late=2, moved=0.0)
@@ -171,12 +206,6 @@ def test_filter_error_takes_delays_of_outputs_and_inputs() -> None:
             assert point is not None
             cost[late_s] = point.cost
         assert min(cost, key=lambda at: cost[at]) == 0.1, signal
-
-
-def test_a_delay_of_an_input_is_refused_by_the_extended_filter() -> None:
-    delays = [{"name": "servo_s", "outputs": ["aileron_rad"]}]
-    with pytest.raises(IdentificationError, match="has no delay of an input \\(aileron_rad\\)"):
-        fit("extended-kalman", equations(delays=delays), [rolled()])
 
 
 def test_without_a_compiler_a_long_record_is_refused_in_a_line() -> None:

@@ -34,10 +34,10 @@ def fit_extended_equations(
 ) -> FitResult:
     """Fit by an extended Kalman filter, its state augmented by all unknowns.
 
-    Common parameters and delays of outputs go on from maneuver to maneuver, what belongs to a
-    record starts anew in each. First deviations are those of the priors, else half of a start
-    value; bounds hold at every sample (Jategaonkar, Flight Vehicle System Identification, 2nd ed.,
-    ch. 7).
+    Common parameters and delays go on from maneuver to maneuver, what belongs to a record starts
+    anew in each. A late input is read anew at every sample, as late as is known by then. First
+    deviations are those of the priors, else half of a start value; bounds hold at every sample
+    (Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 7).
 
     Parameters
     ----------
@@ -51,14 +51,8 @@ def fit_extended_equations(
     Raises
     ------
     IdentificationError
-        If an input has a delay, or the filter diverges.
+        If the filter diverges.
     """
-    late = [u for d in model.delays for u in d.outputs if u in model.inputs]
-    if late:
-        raise IdentificationError(
-            f"extended-kalman has no delay of an input ({', '.join(late)}): estimate it by"
-            " output-error or filter-error"
-        )
     layout = _layout(model)
     n, common = len(model.states), layout.common
     problem = NonlinearProblem(model, maneuvers)
@@ -127,6 +121,7 @@ class _Layout:
     bias: IntArray
     offset: IntArray
     delay: IntArray
+    input_delay: IntArray
 
 
 def _layout(model: NonlinearModel) -> _Layout:
@@ -174,6 +169,7 @@ def _layout(model: NonlinearModel) -> _Layout:
         bias=at(model.states, "bias_rate."),
         offset=at(model.outputs, "bias."),
         delay=np.array([late.get(y, -1) for y in model.outputs], dtype=np.int64),
+        input_delay=np.array([late.get(u, -1) for u in model.inputs], dtype=np.int64),
     )  # fmt: skip
 
 
@@ -204,8 +200,8 @@ def _passed(
         model.source.code.loop(filter_equations), z, P, lower, upper, intensity, variance,
         given.inputs, maneuver.outputs, seen, given.parameters, layout.column, problem.constants,
         problem.tables, np.zeros(n), layout.bias, np.zeros(len(late)), layout.offset,
-        np.zeros(len(late)), layout.delay, leader, maneuver.dt_s, problem.substeps, problem.ramp,
-        e, white, power,
+        np.zeros(len(late)), layout.delay, leader, layout.input_delay, maneuver.dt_s,
+        problem.substeps, problem.ramp, e, white, power,
     ) or not np.isfinite(z).all():  # fmt: skip
         raise IdentificationError(
             f"{maneuver.name}: the Kalman filter diverged; give better start values"

@@ -20,26 +20,51 @@ from host.sysid.numerics.equation_recursion import (
     rates,
     reading_slopes,
 )
+from host.sysid.numerics.fractional_delay import delayed_at
 
 SERIES_ORDER = 4  # of the transition over a step, as of the step itself
 
 
 @compiled_part
-def input_at(inputs: Array, position: float, ramp: float, u: Array) -> None:
-    """Write the inputs at a time, in samples, into `u`; before the first they are the first."""
-    last = len(inputs) - 1
-    k = min(max(int(np.floor(position)), 0), last)
-    share = ramp * min(max(position - k, 0.0), 1.0)
-    ahead = min(k + 1, last)
-    for j in range(inputs.shape[1]):
-        u[j] = inputs[k, j] + share * (inputs[ahead, j] - inputs[k, j])
+def input_at(
+    inputs: Array,
+    position: float,
+    shift: Array,
+    input_column: IntArray,
+    ramp: float,
+    u: Array,
+    by_shift: Array,
+) -> None:
+    """Write the inputs at a time, in samples, into `u`; before the first they are the first.
+
+    Those whose delay is unknown are `shift` samples late; `by_shift` is their slope by it, else 0.
+    All are (m,).
+    """
+    k = min(max(int(np.floor(position)), 0), len(inputs) - 1)
+    share = min(max(position - k, 0.0), 1.0)
+    input_within(inputs, k, share, shift, input_column, ramp, u, by_shift)
 
 
 @compiled_part
-def input_within(inputs: Array, k: int, share: float, ramp: float, u: Array) -> None:
-    """Write the inputs within the step behind sample `k` into `u`."""
+def input_within(
+    inputs: Array,
+    k: int,
+    share: float,
+    shift: Array,
+    input_column: IntArray,
+    ramp: float,
+    u: Array,
+    by_shift: Array,
+) -> None:
+    """Do the same for a share of the step behind sample `k`."""
+    ahead = min(k + 1, len(inputs) - 1)
     for j in range(inputs.shape[1]):
-        u[j] = inputs[k, j] + ramp * share * (inputs[k + 1, j] - inputs[k, j])
+        here, there, slope, slope_there = inputs[k, j], inputs[ahead, j], 0.0, 0.0
+        if input_column[j] >= 0:
+            here, slope = delayed_at(inputs[:, j], k, shift[j])
+            there, slope_there = delayed_at(inputs[:, j], ahead, shift[j])
+        u[j] = here + ramp * share * (there - here)
+        by_shift[j] = slope + ramp * share * (slope_there - slope)
 
 
 @of_equations
@@ -47,12 +72,14 @@ def step_along(
     x: Array,
     h: float,
     u: Array,
+    by_delay: Array,
     p: Array,
     c: Array,
     t: Array,
     bias: Array,
     column: IntArray,
     bias_column: IntArray,
+    input_column: IntArray,
     work: Array,
     fx: Array,
     fu: Array,
@@ -65,8 +92,8 @@ def step_along(
 
     `S` (n, L) is overwritten by their slopes by states and unknowns before the step, a series of
     the slopes of the rates in its middle, which are left in `fx`. `u` (3, m) are the inputs at
-    begin, middle and end; `work` (3, n) is left with the rates at the end in row 0; `B` and `E`
-    (n, L) are work.
+    begin, middle and end, `by_delay` (m,) their slopes in the middle by their delay; `work` (3, n)
+    is left with the rates at the end in row 0; `B` and `E` (n, L) are work.
     """
     n, L = S.shape
     f, stage, total = work[0], work[1], work[2]
@@ -92,6 +119,9 @@ def step_along(
         for b in range(len(column)):
             if column[b] >= 0:
                 B[i, column[b]] += fp[i, b]
+        for b in range(len(input_column)):
+            if input_column[b] >= 0:
+                B[i, input_column[b]] += fu[i, b] * by_delay[b]
         if bias_column[i] >= 0:
             B[i, bias_column[i]] += 1.0
         for b in range(L):
@@ -206,6 +236,7 @@ def filter_equations(
     delay_s: Array,
     delay_column: IntArray,
     leader: IntArray,
+    input_column: IntArray,
     dt_s: float,
     substeps: int,
     ramp: float,
@@ -241,6 +272,8 @@ def filter_equations(
         Of each output, s.
     leader : IntArray, shape (outputs,)
         First output with the same delay.
+    input_column : IntArray, shape (m,)
+        Entry of `z` that is the delay of this input; -1 where `inputs` are as late as they are.
     dt_s, substeps, ramp
         As of `simulate_equations`.
     e : Array, shape (samples, outputs)
@@ -256,7 +289,8 @@ def filter_equations(
     """
     n, L, m, outputs, q = len(bias), len(z), inputs.shape[1], measured.shape[1], len(column)
     p, bias, offset, delay_s = p.copy(), bias.copy(), offset.copy(), delay_s.copy()
-    u, back, work, half = np.zeros((3, m)), np.zeros(n), np.zeros((3, n)), np.zeros(n)
+    u, by_shift, shift = np.zeros((3, m)), np.zeros((3, m)), np.zeros(m)
+    back, work, half = np.zeros(n), np.zeros((3, n)), np.zeros(n)
     fx, fu, fp = np.zeros((n, n)), np.zeros((n, m)), np.zeros((n, q))
     y, yx = np.zeros(outputs), np.zeros((outputs, n))
     yu, yp = np.zeros((outputs, m)), np.zeros((outputs, q))
@@ -272,6 +306,7 @@ def filter_equations(
         take_unknowns(z, offset_column, offset)
         take_unknowns(z, delay_column, delay_s)
         take_unknowns(z, bias_column, bias)
+        take_unknowns(z / dt_s, input_column, shift)
         H[:, :] = 0.0
         for j in range(outputs):
             if leader[j] != j:
@@ -282,10 +317,14 @@ def filter_equations(
             if late != 0.0 or delay_column[j] >= 0:
                 # What is measured now was true `late` ago: one step back along the equations.
                 for part in range(3):
-                    input_at(inputs, k - 0.5 * part * late / dt_s, ramp, u[part])
+                    input_at(
+                        inputs, k - 0.5 * part * late / dt_s, shift, input_column, ramp, u[part],
+                        by_shift[part],
+                    )  # fmt: skip
                 step_along(
-                    back, -late, u, p, c, t, bias, column, bias_column, work, fx, fu, fp, B, E, S
-                )
+                    back, -late, u, by_shift[1] / dt_s, p, c, t, bias, column, bias_column,
+                    input_column, work, fx, fu, fp, B, E, S,
+                )  # fmt: skip
                 if delay_column[j] >= 0:
                     for i in range(n):
                         S[i, delay_column[j]] -= work[0, i]
@@ -293,7 +332,7 @@ def filter_equations(
                 S[:, :] = 0.0
                 for i in range(n):
                     S[i, i] = 1.0
-            input_at(inputs, k - late / dt_s, ramp, u[2])
+            input_at(inputs, k - late / dt_s, shift, input_column, ramp, u[2], by_shift[2])
             reading_slopes(back, u[2], p, c, t, y, yx, yu, yp)
             multiply(yx, S, reached)
             for i in range(outputs):
@@ -305,6 +344,9 @@ def filter_equations(
                 for b in range(q):
                     if column[b] >= 0:
                         H[i, column[b]] += yp[i, b]
+                for b in range(m):
+                    if input_column[b] >= 0:
+                        H[i, input_column[b]] += yu[i, b] * by_shift[2, b] / dt_s
                 if offset_column[i] >= 0:
                     H[i, offset_column[i]] += 1.0
         if not take_measurements(z, P, H, variance, seen[k], e[k], white[k], power[k], change, PH):
@@ -315,9 +357,16 @@ def filter_equations(
             break
         take_unknowns(z, column, p)
         take_unknowns(z, bias_column, bias)
+        take_unknowns(z / dt_s, input_column, shift)
         for s in range(substeps):
             for part in range(3):
-                input_within(inputs, k, (s + 0.5 * part) / substeps, ramp, u[part])
-            step_along(z, h, u, p, c, t, bias, column, bias_column, work, fx, fu, fp, B, E, S)
+                input_within(
+                    inputs, k, (s + 0.5 * part) / substeps, shift, input_column, ramp, u[part],
+                    by_shift[part],
+                )  # fmt: skip
+            step_along(
+                z, h, u, by_shift[1] / dt_s, p, c, t, bias, column, bias_column, input_column,
+                work, fx, fu, fp, B, E, S,
+            )  # fmt: skip
             spread_ahead(P, S, fx, intensity, h, G, half)
     return True

@@ -187,7 +187,8 @@ class EquationFilterProblem:
         intensity, variance = self.noise(theta)
         if not (np.isfinite(intensity).all() and np.isfinite(variance).all()):
             return None
-        none = np.full(max(n, outputs), -1, dtype=np.int64)
+        inputs = g.inputs.shape[1]
+        none = np.full(max(n, outputs, inputs), -1, dtype=np.int64)
         seen = np.ones(maneuver.outputs.shape, dtype=bool)
         if maneuver.held and maneuver.sampled is not None:
             seen = np.ascontiguousarray(maneuver.sampled)
@@ -199,7 +200,7 @@ class EquationFilterProblem:
             intensity, variance, g.inputs, maneuver.outputs, seen, g.parameters,
             np.full(len(g.parameters), -1, dtype=np.int64), problem.constants, problem.tables,
             g.bias, none[:n], problem.output_offsets(g.local), none[:outputs], delay_s,
-            none[:outputs], self._leader, maneuver.dt_s,
+            none[:outputs], self._leader, none[:inputs], maneuver.dt_s,
             self._substeps(maneuver.dt_s), problem.ramp, e, white, power,
         ):  # fmt: skip
             return None

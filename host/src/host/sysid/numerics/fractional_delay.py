@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from host.arrays import Array
+from host.compiled import compiled_part
 
-Weights = Callable[[Array], tuple[Array, Array, Array, Array]]
+Weights = Callable[[Any], tuple[Any, Any, Any, Any]]  # of a number or of an array
 
 
 def delay_columns(values: Array, shift: float) -> Array:
@@ -31,6 +33,18 @@ def delay_columns(values: Array, shift: float) -> Array:
 def slope_by_delay(values: Array, shift: float) -> Array:
     """Return the derivative of `delay_columns` by the shift, of the shape of `values`."""
     return _interpolated(values, shift, _slopes)
+
+
+@compiled_part
+def delayed_at(values: Array, row: int, shift: float) -> tuple[float, float]:
+    """Return one number of `delay_columns` and of `slope_by_delay`, of one column (samples,)."""
+    position = row - shift
+    base = min(max(int(np.floor(position)), 1), len(values) - 3)
+    before, here, ahead, beyond = _cubics(position - base)
+    d_before, d_here, d_ahead, d_beyond = _slopes(position - base)
+    a, b, c, d = values[base - 1], values[base], values[base + 1], values[base + 2]
+    value = before * a + here * b + ahead * c + beyond * d
+    return value, d_before * a + d_here * b + d_ahead * c + d_beyond * d
 
 
 def _interpolated(values: Array, shift: float, weights_at: Weights) -> Array:
@@ -62,7 +76,8 @@ def _one_by_one(values: Array, rows: np.ndarray, shift: float, weights_at: Weigh
     return result
 
 
-def _cubics(s: Array) -> tuple[Array, Array, Array, Array]:
+@compiled_part
+def _cubics(s: Any) -> tuple[Any, Any, Any, Any]:
     """Return Lagrange's cubic polynomials for samples at -1, 0, 1 and 2."""
     return (
         -s * (s - 1.0) * (s - 2.0) / 6.0,
@@ -72,7 +87,8 @@ def _cubics(s: Array) -> tuple[Array, Array, Array, Array]:
     )
 
 
-def _slopes(s: Array) -> tuple[Array, Array, Array, Array]:
+@compiled_part
+def _slopes(s: Any) -> tuple[Any, Any, Any, Any]:
     """Return their derivatives by the delay, which moves s backwards."""
     return (
         (3.0 * s * s - 6.0 * s + 2.0) / 6.0,
