@@ -8,7 +8,7 @@ Epidemiology 33, 2009: from the eigenvalues of their correlation).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,13 +16,13 @@ from scipy import special
 
 from host.arrays import Array
 from host.sysid.numerics.ar_noise import ArNoise
+from host.sysid.numerics.information_inverse import identified_inverse
+from host.sysid.numerics.shared_noise import shared_noise_covariance
 
 TAKEN = 1e-4  # of a signature's power that the parameters leave: with less they are the same
 SAME = 1e-3  # of the largest eigenvalue of their correlation: less tells no two apart
 FEWEST_FREEDOM = 30.0  # of the noise along a signature, for a test
-# Means: noise of two outputs is compared up to so many apart. A gust that rolls the aircraft
-# reaches the roll rate at once, the bank angle two means later.
-LONGEST_LAG = 3
+LEAST = 0.1  # of a score's variance in independent noise: what two outputs may take off it
 SHOWS = 0.2  # of a signature's information: an output with more shows the error
 
 
@@ -81,26 +81,7 @@ def signature_test(
     score : Array, shape (P,)
     """
     white = [[d.noise.whiten(Z) for Z in d.signatures] for d in data]
-    cross = np.sum(
-        [
-            J.T @ Z / d.variance
-            for d, blocks in zip(data, white, strict=True)
-            for J, Z in zip(d.slopes, blocks, strict=True)
-        ],
-        axis=0,
-    )
-    parts = np.array(
-        [
-            np.sum([np.sum(Z * Z, axis=0) for Z in blocks], axis=0) / d.variance
-            for d, blocks in zip(data, white, strict=True)
-        ]
-    )
-    gram = sum(Z.T @ Z / d.variance for d, blocks in zip(data, white, strict=True) for Z in blocks)
-    right = sum(
-        Z.T @ e / d.variance
-        for d, blocks in zip(data, white, strict=True)
-        for Z, e in zip(blocks, d.residuals, strict=True)
-    )
+    cross, gram, right, parts = _sums(data, white)
     link = inverse @ cross
     inner = gram - cross.T @ link
     left = np.diag(inner) > TAKEN * np.maximum(np.diag(gram), 1e-300)
@@ -112,15 +93,17 @@ def signature_test(
     free = left & (freedom >= FEWEST_FREEDOM)
     if not free.any():
         return SignatureTest("", 1.0, 1.0, (), np.zeros(len(score)))
-    inner, power = inner[np.ix_(free, free)], np.diag(inner)[free]
-    variance = power + np.maximum(_between_outputs(data, reduced)[free], 0.0)
-    scores = (right - link.T @ score)[free] / np.sqrt(variance)
-    squares = scores**2
-    values, vectors = np.linalg.eigh(inner / np.sqrt(np.outer(power, power)))
+    inner, raw = inner[np.ix_(free, free)], (right - link.T @ score)[free]
+    told = [[w[:, free] for w in own] for own in reduced]
+    size = identified_inverse(inner) @ raw
+    covariance = _score_covariance(data, told, inner, size, inverse @ score)
+    deviation = np.sqrt(np.maximum(np.diag(covariance), LEAST * np.diag(inner)))
+    scores = raw / deviation
+    values, vectors = np.linalg.eigh(covariance / np.outer(deviation, deviation))
     values = np.maximum(values, 0.0)
     known = values > SAME * values[-1]
     different = float(np.sum(np.sqrt(values)) ** 2 / np.sum(values))
-    single = special.fdtrc(1.0, freedom[free], squares)
+    single = special.fdtrc(1.0, freedom[free], scores**2)
     best = int(np.argmin(single))
     place = int(np.flatnonzero(free)[best])
     share = parts[:, place] / np.sum(parts[:, place])
@@ -129,40 +112,51 @@ def signature_test(
         p_value=float(-np.expm1(different * np.log1p(-min(single[best], 1.0 - 1e-16)))),
         ratio=float(np.mean((vectors.T @ scores)[known] ** 2 / values[known])),
         outputs=tuple(y for y, part in zip(outputs, share, strict=True) if part > SHOWS),
-        shift=-link[:, place] * scores[best] * np.sqrt(variance[best]) / power[best],
+        shift=-link[:, place] * raw[best] / inner[best, best],
     )
 
 
-def _between_outputs(data: Sequence[WhitenedOutput], reduced: Sequence[Sequence[Array]]) -> Array:
-    """Return what noise that two outputs share adds to the variance of each score, (errors,).
+def _sums(
+    data: Sequence[WhitenedOutput], white: Sequence[Sequence[Array]]
+) -> tuple[Array, Array, Array, Array]:
+    """Return sums of the whitened signatures (k) over all outputs and maneuvers.
 
-    A gust moves all outputs. Taken for independent, they made an error out of one gust that two of
-    them felt: beta and ay go together by -0.8 there.
+    With the slopes, (P, k); with themselves, (k, k); with the residuals, (k,); the power of each in
+    each output, (p, k).
     """
-    total = np.zeros(reduced[0][0].shape[1])
-    lags = range(-LONGEST_LAG, LONGEST_LAG + 1)
-    for k, (second, late) in enumerate(zip(data, reduced, strict=True)):
-        for first, early in list(zip(data, reduced, strict=True))[:k]:
-            both = first.variance * second.variance
-            samples = sum(len(e) for e in first.residuals)
-            for lag in lags:
-                noise = sum(
-                    float(a @ b) for a, b in _lagged(first.residuals, second.residuals, lag)
-                )
-                power = sum(np.sum(a * b, axis=0) for a, b in _lagged(early, late, lag))
-                taper = 1.0 - abs(lag) / (LONGEST_LAG + 1)  # Bartlett's, for a positive variance
-                total += 2.0 * taper * noise / samples * power / both
-    return total
+    rows = [
+        (J, Z, e, d.variance)
+        for d, blocks in zip(data, white, strict=True)
+        for J, Z, e in zip(d.slopes, blocks, d.residuals, strict=True)
+    ]
+    cross = np.sum([J.T @ Z / v for J, Z, _, v in rows], axis=0)
+    gram = np.sum([Z.T @ Z / v for _, Z, _, v in rows], axis=0)
+    right = np.sum([Z.T @ e / v for _, Z, e, v in rows], axis=0)
+    parts = [
+        np.sum([np.sum(Z * Z, axis=0) for Z in blocks], axis=0) / d.variance
+        for d, blocks in zip(data, white, strict=True)
+    ]
+    return cross, gram, right, np.array(parts)
 
 
-def _lagged(
-    first: Sequence[Array], second: Sequence[Array], lag: int
-) -> Iterator[tuple[Array, Array]]:
-    """Return rows of the first beside rows of the second that are `lag` later."""
-    for a, b in zip(first, second, strict=True):
-        n = len(a) - abs(lag)
-        if n > 0:
-            yield a[max(-lag, 0) :][:n], b[max(lag, 0) :][:n]
+def _score_covariance(
+    data: Sequence[WhitenedOutput],
+    reduced: Sequence[Sequence[Array]],
+    inner: Array,
+    size: Array,
+    step: Array,
+) -> Array:
+    """Return the covariance of the scores, noise that outputs share included, (errors, errors).
+
+    Noise is what parameters and signatures together leave: an error that is there is none.
+    """
+    scale = [np.sqrt(d.variance) for d in data]
+    noise = [
+        [(e - J @ step - w @ size) / s for e, J, w in zip(d.residuals, d.slopes, own, strict=True)]
+        for d, own, s in zip(data, reduced, scale, strict=True)
+    ]
+    columns = [[w / s for w in own] for own, s in zip(reduced, scale, strict=True)]
+    return np.asarray(inner + shared_noise_covariance(noise, columns))
 
 
 def _freedom(data: Sequence[WhitenedOutput], reduced: Sequence[Sequence[Array]]) -> Array:
