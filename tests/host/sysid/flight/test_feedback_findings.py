@@ -16,14 +16,11 @@ from host.sysid.answer.trust_rules import Evidence
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 from host.sysid.flight.data_finding import Feedback, Finding
-from host.sysid.flight.feedback_findings import feedback_findings, taken_over
+from host.sysid.flight.feedback_findings import feedback_findings
 from host.sysid.flight.flight_tables import read_flight_columns
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import identify
-from host.sysid.flight.maneuver_detection import detect_maneuvers
 from host.sysid.flight.maneuver_selection import select_maneuvers
-from studies import independent
-from studies.foreign.flight import INPUTS
 from studies.wrong_flights import fly
 
 from tests.host.logs import ROOT
@@ -201,17 +198,3 @@ def test_coefficients_of_the_pair_are_doubted_in_equations_that_have_both() -> N
     law = Feedback("rudder_rad", ("r_radps",), (0.4,))
     [doubt] = input_feedback(cast(CoefficientAnswer, SimpleNamespace(fit=fitted)), law)
     assert doubt.names == ("Cl_r", "Cl_dr", "Cn_r", "Cn_dr")
-
-
-def test_a_pilot_who_takes_over_is_told_from_a_test_input() -> None:
-    """The independent simulator's pilot levels at 6.5 s after the beginning of every input."""
-    columns = independent.flown(independent.cells()["dryden, fixed, spread, 1 m/s"], 901)
-    begun = [start_s for _, start_s, *_ in INPUTS]
-    found: dict[bool, list[bool]] = {True: [], False: []}
-    for maneuver in detect_maneuvers(columns):
-        commanded = min(abs(maneuver.start_s - s) for s in begun) < 0.06
-        if commanded or maneuver.axis == "aileron_rad":
-            found[commanded].append(taken_over(columns, maneuver, ("aileron_rad", "rudder_rad")))
-    assert not any(found[True])
-    assert len(found[True]) >= 8
-    assert sum(found[False]) >= 0.7 * len(found[False]) >= 4

@@ -27,16 +27,12 @@ ATTITUDE = ("phi_rad", "theta_rad", "psi_rad", "altitude_m")
 # of a pilot moves the other way.
 HOLDING = {
     ("elevator_rad", "q_radps"): 1, ("elevator_rad", "alpha_rad"): 1,
-    ("elevator_rad", "theta_rad"): 1,
     ("aileron_rad", "p_radps"): -1, ("aileron_rad", "phi_rad"): -1,
     ("aileron_rad", "psi_rad"): -1,
     ("rudder_rad", "r_radps"): 1, ("rudder_rad", "beta_rad"): -1,
 }  # fmt: skip
 # What a waypoint tracker's bank loop follows in every leg, and what in some.
 BANK_LOOP, HEADING = ("p_radps", "phi_rad"), "psi_rad"
-LEVELLED = {"elevator_rad": ("q_radps", "theta_rad"), "aileron_rad": BANK_LOOP}
-# After the jump with which a pilot takes over, until he may leave the sticks again.
-TAKEN_OVER_S = (0.1, 1.5)
 MOMENT = {"elevator_rad": "M", "aileron_rad": "L", "rudder_rad": "N"}
 LABEL = {
     "elevator_rad": "de", "aileron_rad": "da", "rudder_rad": "dr", "airspeed_mps": "V",
@@ -64,36 +60,6 @@ def feedback_findings(
         for surface in FOLLOWED
         if surface in columns and (finding := _finding(columns, maneuvers, surface)) is not None
     ]
-
-
-def taken_over(
-    columns: Mapping[str, Array], maneuver: DetectedManeuver, surfaces: Sequence[str]
-) -> bool:
-    """Return whether a maneuver is a pilot's taking over: from its start on elevator or aileron
-    follow rate and attitude as a hand that levels does.
-
-    Of the independent simulator, gusts of 1 m/s that roll, it names 46 of 51 pulses of the aileron
-    with which its pilot takes over, and none of 57 test inputs.
-
-    Parameters
-    ----------
-    columns : mapping
-        SI columns on an even grid, those of the maneuver among them.
-    maneuver : DetectedManeuver
-    surfaces : sequence of str
-        That are judged.
-    """
-    t = columns["t_s"]
-    first, last = (maneuver.start_s + after for after in TAKEN_OVER_S)
-    rows = np.flatnonzero((t >= first) & (t <= min(last, maneuver.end_s)))
-    for surface in set(surfaces) & set(LEVELLED) & set(columns):
-        signals = {n: columns[n] for n in LEVELLED[surface] if n in columns}
-        if not rows.size or float(np.std(columns[surface][rows])) < STILL_RAD:
-            continue
-        law = feedback_law(_period_s(columns), columns[surface], signals, [rows])
-        if law is not None and _holds(surface, law):
-            return True
-    return False
 
 
 def _finding(
@@ -183,15 +149,10 @@ def _tracker(
     law = feedback_law(dt_s, moved, signals, legs)
     if law is None or "phi_rad" not in law.signals:
         return None, ""
-    if not _holds("aileron_rad", law):
+    gains = zip(law.signals, law.gains, strict=True)
+    if any(HOLDING["aileron_rad", name] * gain < 0.0 for name, gain in gains):
         return None, ""
     return law, f" within {len(legs)} legs of constant command"
-
-
-def _holds(surface: str, law: FeedbackLaw) -> bool:
-    """Return whether every signal moves the surface as one that is to hold the aircraft."""
-    gains = zip(law.signals, law.gains, strict=True)
-    return all(HOLDING[surface, name] * gain >= 0.0 for name, gain in gains)
 
 
 def _period_s(columns: Mapping[str, Array]) -> float:

@@ -20,11 +20,11 @@ from host.sysid.estimators.gust_penetration import with_unknown_roll_lag
 from host.sysid.estimators.missing_control import missing_control, widened_by_missing_control
 from host.sysid.flight.airspeed_tolerance import airspeed_shift
 from host.sysid.flight.column_noise import with_column_noise
-from host.sysid.flight.feedback_findings import taken_over
 from host.sysid.flight.filter_step import others_recorded, sensors_known
 from host.sysid.flight.free_simulation import FreeResponses, free_responses
 from host.sysid.flight.linear_stages import LinearEstimate, LinearIntervals
 from host.sysid.flight.noise_model_limits import excess_over_noise_model
+from host.sysid.flight.pilot_takeover import taken_over
 from host.sysid.flight.sampling_error import hold_shift, kink_shift
 from host.sysid.flight.systematic_errors import add_systematic_covariance, systematic_error_shifts
 from host.sysid.models.fit_result import FitResult
@@ -33,6 +33,7 @@ from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
 from host.sysid.numerics.maneuver_agreement import inflate_covariance, maneuver_agreement
 from host.sysid.numerics.score_variance import white_fit_variance
 
+ENOUGH = 0.25  # of all samples, in maneuvers that a test input made
 WHITE = "output error (white)"  # its noise is judged beside what the inputs drive
 
 
@@ -108,11 +109,12 @@ def _of_noise(e: LinearEstimate) -> tuple[FitResult, InputCoherence | None]:
 def _coherence(
     e: LinearEstimate, free: FreeResponses, at_trim: Sequence[Maneuver]
 ) -> InputCoherence:
-    """Return what the inputs drive beside the model.
+    """Return what the inputs drive beside the model; what test inputs alone show, where that is
+    nothing.
 
-    A pilot who takes over follows what gusts did, and what they leave then looks driven by him (a
-    lag of the aileron of -3.2 deviations in the mean of 12 right fits in air that rolls, -0.3 in
-    test inputs alone). A suspicion that test inputs do not share is dropped.
+    What gusts leave looks driven by a pilot who takes over (`pilot_takeover`): a lag of the aileron
+    of -3.2 deviations in the mean of 12 right fits in air that rolls, -0.3 in test inputs alone. A
+    suspicion that these do not share is dropped, if there is enough of them to suspect anything.
     """
     found = input_coherence(free.problem, free.responses, free.theta)
     if not found.suspected:
@@ -123,7 +125,8 @@ def _coherence(
         for maneuver, flown, columns in zip(at_trim, e.used, e.cuts, strict=True)
         if not taken_over(columns, flown.found, surfaces)
     ]
-    if len(commanded) in (0, len(at_trim)):
+    samples, every = (sum(m.samples for m in some) for some in (commanded, at_trim))
+    if samples < ENOUGH * every or len(commanded) == len(at_trim):
         return found
     again = free_responses(e.model, e.estimate, commanded)
     if again is None:
