@@ -204,9 +204,10 @@ def _forget_oldest(place: Path, kind: str) -> None:
 def _options(reordered: bool) -> dict[str, Any]:
     """Return numba's options.
 
-    A kernel that is called and not inlined is in the object files of all its callers. Whichever is
-    loaded first runs in all of them, and where sums are reordered each is another: the run that
-    compiled flew another last digit than those after it.
+    Kernels whose sums may be reordered are inlined (`forceinline`) in all that call them. Else each
+    caller's object file has a copy that rounds differently, and the one loaded first runs for all:
+    the run that compiled flew another last digit than those after it. A virtual flight takes 10 %
+    longer to compile so.
     """
     return {"error_model": "numpy", "fastmath": reordered, "forceinline": reordered}
 

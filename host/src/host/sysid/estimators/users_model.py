@@ -31,7 +31,7 @@ GUST, FILTER = "filter-error-gust", "filter-error"
 MEMORY, WHITE = "output-error", "output-error-white"
 AT_LIMIT = 1e-9
 # Samples times unknowns times signals of another delay. By filter error 420 000, six degrees of
-# freedom, and 950 000, flight-path reconstruction, take thirteen seconds of processor time.
+# freedom, take forty seconds of processor time, 950 000, flight-path reconstruction, thirteen.
 MOST_WORK = 1_200_000
 
 

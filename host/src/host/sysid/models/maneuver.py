@@ -120,6 +120,9 @@ class Maneuver:
     ) -> Maneuver:
         """Cut one maneuver out of a flight table.
 
+        Inputs are as the table has them: what `hold = "smooth"` of a model says of the motion
+        between samples `host.identify` puts in.
+
         Parameters
         ----------
         table : DataFrame

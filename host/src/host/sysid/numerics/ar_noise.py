@@ -15,7 +15,7 @@ from scipy import linalg
 from host.arrays import Array
 
 POLE_LIMIT = 0.999  # radius: nearer to one, 2000 samples cannot separate noise from drift
-MOST_REFLECTED = 1.0 - 1e-9  # reflection coefficient: what rounding leaves of a stable one
+MOST_REFLECTED = 1.0 - 1e-9  # reflection coefficient: of a stable process rounding makes it one
 SHRINKING, MOST_SHRINKINGS = 0.995, 200  # of the radius of poles
 
 
@@ -64,27 +64,32 @@ class ArNoise:
 
 
 def autocovariance(coefficient: Array, lags: int) -> Array:
-    """Return the autocovariance of an AR process of unit innovation variance, lags 0 to `lags`.
+    """Return the autocovariance of an AR process of unit innovation variance, (lags + 1,).
 
-    By the Levinson-Durbin recursion, down to the reflection coefficients and up again. With these
-    within one it is positive definite whatever rounding does: of poles next to one the Yule-Walker
-    equations gave a negative variance.
+    By the Levinson-Durbin recursion (Kay, Modern Spectral Estimation, ch. 6), down to the
+    reflection coefficients and up again. With these within one it is positive definite whatever
+    rounding does: of poles next to one the Yule-Walker equations gave a negative variance.
+
+    Parameters
+    ----------
+    coefficient : Array, shape (order,)
+    lags : int
     """
     order = len(coefficient)
-    reflection, left = np.zeros(order), np.asarray(coefficient, dtype=np.float64)
+    reflection, predictor = np.zeros(order), np.asarray(coefficient, dtype=np.float64)
     for last in range(order - 1, -1, -1):
-        reflection[last] = np.clip(left[last], -MOST_REFLECTED, MOST_REFLECTED)
-        left = left[:last] + reflection[last] * left[:last][::-1]
-        left /= 1.0 - reflection[last] ** 2
+        reflection[last] = np.clip(predictor[last], -MOST_REFLECTED, MOST_REFLECTED)
+        predictor = predictor[:last] + reflection[last] * predictor[:last][::-1]
+        predictor /= 1.0 - reflection[last] ** 2
     innovation = 1.0 / np.prod(1.0 - reflection**2)
     result = np.zeros(max(lags, order) + 1)
-    result[0], so_far = innovation, np.zeros(0)
-    for lag, part in enumerate(reflection, start=1):
-        result[lag] = part * innovation + so_far @ result[1:lag][::-1]
-        so_far = np.append(so_far - part * so_far[::-1], part)
-        innovation *= 1.0 - part**2
+    result[0], predictor = innovation, np.zeros(0)
+    for lag, reflected in enumerate(reflection, start=1):
+        result[lag] = reflected * innovation + predictor @ result[1:lag][::-1]
+        predictor = np.append(predictor - reflected * predictor[::-1], reflected)
+        innovation *= 1.0 - reflected**2
     for lag in range(order + 1, lags + 1):
-        result[lag] = so_far @ result[lag - order : lag][::-1]
+        result[lag] = predictor @ result[lag - order : lag][::-1]
     return result[: lags + 1]
 
 

@@ -88,7 +88,13 @@ class Orders(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """What the pilot means to do, and the maneuvers that come of it."""
+    """What the pilot means to do, and the maneuvers that come of it.
+
+    Attributes
+    ----------
+    orders : Orders
+    windows : list of Window
+    """
 
     orders: Orders
     windows: list[Window]
