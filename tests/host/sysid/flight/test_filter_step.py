@@ -5,8 +5,10 @@ import pytest
 from host.instrument.deviations import sensor_error_model
 from host.instrument.recording import AUTOPILOT, FOREIGN, OWN
 from host.sysid.compatibility.reconstruction import Compatibility
+from host.sysid.flight.column_sampling import sampled_name
 from host.sysid.flight.filter_step import with_filter_step
 from host.sysid.flight.linear_estimator import identify
+from host.sysid.flight.linear_model import model_and_method
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.flight.reconstructed_flight import FlownManeuver, ReconstructedFlight
 from host.sysid.models.templates import Trim, template
@@ -19,9 +21,13 @@ NAMES = (
 FOUND = DetectedManeuver("aileron_rad", "doublet", 2.0, 3.0, 6.0, 0.1, 3)
 
 
-def _flown(dt_s: float, *, known: bool, maker: str = OWN) -> FlownManeuver:
+def _flown(
+    dt_s: float, *, known: bool, maker: str = OWN, slow: tuple[str, ...] = ()
+) -> FlownManeuver:
+    """Return a maneuver of even columns; of the `slow` ones every fifth row was measured."""
     t = np.arange(0.0, 10.0, dt_s)
     columns = {"t_s": t} | {name: np.sin((k + 1.0) * t) for k, name in enumerate(NAMES)}
+    columns |= {sampled_name(name): 1.0 * (np.arange(len(t)) % 5 == 0) for name in slow}
     instrument = sensor_error_model("ultrastick25e") if known else None
     agreement = Compatibility((), {}, (), gps=False, instrument=instrument)
     flight = ReconstructedFlight("", columns, columns, (FOUND,), agreement, not known, maker=maker)
@@ -53,6 +59,24 @@ def test_slow_columns_of_others_and_longitudinal_ones_stay_as_they_are() -> None
     ):
         [same] = with_filter_step([plain], model)
         np.testing.assert_array_equal(same.cut(model).outputs, plain.cut(model).outputs)
+
+
+@pytest.mark.parametrize(
+    ("maker", "dt_s", "method"),
+    [
+        (OWN, 0.01, "output-error-white"),
+        (AUTOPILOT, 0.005, "output-error-white"),
+        (OWN, 0.02, "filter-error-gust"),
+        (FOREIGN, 0.01, "filter-error-gust"),
+    ],
+)
+def test_a_slow_sensor_of_ours_has_no_means_and_no_filter_at_a_shorter_step(
+    maker: str, dt_s: float, method: str
+) -> None:
+    flown = [_flown(dt_s, known=True, maker=maker, slow=("beta_rad",))]
+    _, chosen, remarks = model_and_method(flown, Trim(18.0), "lateral", "flight", None)
+    assert chosen == method
+    assert any("no means over 20 ms" in line for line in remarks) == (method != "filter-error-gust")
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,8 @@ reads the aircraft's dynamics from samples next to each other. Between these our
 low-pass and a straight line to the instant of the row: what is missing there passes for the
 aircraft. On recorded flights L_p and L_da came out 15 and 14 % small at a step of 10 ms, and 9 and
 6 % with perfect sensors and [1 2 1] / 4 over all columns alike; within 2 % at 20 ms. Means take the
-same off inputs and outputs, which to a linear model is no error.
+same off inputs and outputs, which to a linear model is no error. A slow sensor has no such mean:
+its record stays with output error.
 
 Columns of others are fitted as they are, with an aircraft file and without: means hide from a
 filter that a pilot or an autopilot follows the roll rate (on the independent flights L_p 4 to 7 %
@@ -49,13 +50,27 @@ def rolling_gust_identifiable(maneuvers: Sequence[FlownManeuver]) -> bool:
     return sensors_known(maneuvers) or others_recorded(maneuvers)
 
 
-def with_filter_step(maneuvers: Sequence[FlownManeuver], model: LinearModel) -> list[FlownManeuver]:
-    """Return lateral maneuvers of our instrument as means over `STEP_S`, others as they are.
+def no_filter_step(maneuvers: Sequence[FlownManeuver], model: LinearModel) -> str:
+    """Return why a filter cannot have the step that it needs; empty where it can.
 
-    Those of a slow sensor stay too: a mean has what was not measured.
+    Means over `STEP_S` would have what a slow sensor did not measure.
     """
-    if not feels_roll(model) or not sensors_known(maneuvers) or others_recorded(maneuvers):
+    if not _needs_means(maneuvers, model) or not any(m.cut(model).held for m in maneuvers):
+        return ""
+    return f"a slow sensor has no means over {1000.0 * STEP_S:g} ms, which air that rolls needs"
+
+
+def with_filter_step(maneuvers: Sequence[FlownManeuver], model: LinearModel) -> list[FlownManeuver]:
+    """Return lateral maneuvers of our instrument as means over `STEP_S`, others as they are."""
+    if not _needs_means(maneuvers, model) or no_filter_step(maneuvers, model):
         return list(maneuvers)
-    if any(m.cut(model).held for m in maneuvers):
-        return list(maneuvers)
-    return [replace(m, block=max(1, round(STEP_S / m.dt_s))) for m in maneuvers]
+    return [replace(m, block=_rows_of_step(m)) for m in maneuvers]
+
+
+def _needs_means(maneuvers: Sequence[FlownManeuver], model: LinearModel) -> bool:
+    ours = sensors_known(maneuvers) and not others_recorded(maneuvers)
+    return ours and feels_roll(model) and any(_rows_of_step(m) > 1 for m in maneuvers)
+
+
+def _rows_of_step(maneuver: FlownManeuver) -> int:
+    return max(1, round(STEP_S / maneuver.dt_s))

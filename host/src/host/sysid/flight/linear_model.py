@@ -10,11 +10,14 @@ import numpy as np
 from host.instrument.deviations import SensorErrorModel, deviations, unknown_sensors
 from host.sysid.compatibility.path_preparation import NO_OFFSETS
 from host.sysid.estimators.start_values import regression_estimates
-from host.sysid.flight.filter_step import feels_roll, rolling_gust_identifiable
+from host.sysid.flight.filter_step import (
+    feels_roll,
+    no_filter_step,
+    rolling_gust_identifiable,
+)
 from host.sysid.flight.hidden_angles import without_vanes
 from host.sysid.flight.reconstructed_flight import FlownManeuver
 from host.sysid.identification_error import IdentificationError
-from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.residual_delays import STANDARD_DELAYS, without_standard_delays
 from host.sysid.models.state_space_model import (
     LinearModel,
@@ -22,7 +25,7 @@ from host.sysid.models.state_space_model import (
     without_outputs,
 )
 from host.sysid.models.templates import TEMPLATES, Trim, template
-from host.sysid.numerics.intermittent_filter import too_slow
+from host.sysid.numerics.intermittent_filter import no_clock, too_slow
 
 AXIS_OF = {
     "longitudinal": ("elevator_rad",),
@@ -92,30 +95,29 @@ def model_and_method(
     instrument = None if flight.compatibility is None else flight.compatibility.instrument
     if own is None and instrument is not None and free:
         model = with_drag_arm(model, trim, instrument)
+    if method == GUST and own is None:
+        why = no_filter_step(used, model)
+        remarks += (f"{why}: L_p and L_da may come out small",) if why else ()
     if method == DEFAULT_METHOD and own is None:
-        data = [m.cut(model) for m in used]
-        slow = too_slow(data) or _no_clock(model, data)
-        # Of our own log laterally only where its sensors are known (`filter_step`).
-        rolls = feels_roll(model) and rolling_gust_identifiable(used)
-        vane = "beta_rad" if rolls else "alpha_rad"
-        measured = vane in model.states and vane in model.outputs
-        gust = measured and trim.known
-        if gust and slow:
-            remarks += (f"{slow}; output error stands instead",)
-        method = GUST if gust and not slow else "output-error-white"
+        method, why = _default_method(model, used, trim)
+        remarks += (why,) if why else ()
         if method != GUST and template_name == "lateral":
             model = without_attitude(model, used)
     return model, method, remarks
 
 
-def _no_clock(model: LinearModel, data: Sequence[Maneuver]) -> str:
-    """Return why a filter cannot tell the delays of a model; empty where it can.
-
-    With every column held for five rows, in gusts, the IMU seemed up to 2 ms late and M_q of four
-    flights was 2 to 10 % small; in calm air M_alpha was 2.6 standard errors off in two of three.
-    """
-    quick = all(m.sampled is None or m.sampled.all(axis=0).any() for m in data)
-    return "" if quick or not model.delays else "no column is quick enough to tell the delays"
+def _default_method(
+    model: LinearModel, used: Sequence[FlownManeuver], trim: Trim
+) -> tuple[str, str]:
+    """Return what fits a template, and why it is not the gust filter where that was to be."""
+    # Of our own log laterally only where its sensors are known (`filter_step`).
+    rolls = feels_roll(model) and rolling_gust_identifiable(used)
+    vane = "beta_rad" if rolls else "alpha_rad"
+    if not (trim.known and vane in model.states and vane in model.outputs):
+        return "output-error-white", ""
+    data = [m.cut(model) for m in used]
+    why = too_slow(data) or no_clock(model, data) or no_filter_step(used, model)
+    return ("output-error-white", f"{why}; output error stands instead") if why else (GUST, "")
 
 
 def template_at(
