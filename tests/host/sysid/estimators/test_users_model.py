@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from host.arrays import Array
@@ -99,6 +101,29 @@ def test_a_filter_takes_out_the_delays_that_output_error_finds() -> None:
     k = found.result.index("M_alpha")
     assert abs(found.result.estimate[k] + 80.0) < found.result.half_width()[k]
     assert found.result.covariance[k, k] > 1.05 * plain.result.covariance[k, k]
+
+
+def with_slow(slow: list[bool]) -> list[Maneuver]:
+    """Return two maneuvers in gusts, of two sample periods; slow outputs are every other row's."""
+    whole = flown("gust")
+    coarse = Maneuver(2.0 * DT_S, whole.inputs[::2], whole.outputs[::2])
+    return [
+        replace(m, sampled=~np.outer(np.arange(m.samples) % 2 == 1, slow)) for m in (whole, coarse)
+    ]
+
+
+def test_a_filter_tells_delays_only_where_a_column_is_quick() -> None:
+    why = "no column is quick enough to tell the delays"
+    delays = [{"name": "vane_s", "outputs": ["alpha_rad"], "prior_sd_s": 0.01, "limit_s": 0.03}]
+    late, still = short_period(delays=delays), short_period()
+    for method in ("filter-error", "filter-error-gust"):
+        with pytest.raises(IdentificationError, match=why):
+            fit_users_model(method, late, with_slow([True, True]), AIRSPEED_MPS, {})
+    found = fit_by_evidence(late, with_slow([True, True]), AIRSPEED_MPS)
+    assert found.method.startswith("output-error")
+    assert why in found.remarks[0]
+    for model, slow in ((late, [True, False]), (still, [True, True])):
+        assert fit_by_evidence(model, with_slow(slow), AIRSPEED_MPS).method == "filter-error-gust"
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver, measurements
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.intermittent_filter import too_slow
+from host.sysid.numerics.intermittent_filter import no_clock, too_slow
 
 GUST, FILTER = "filter-error-gust", "filter-error"
 MEMORY, WHITE = "output-error", "output-error-white"
@@ -142,9 +142,9 @@ def fit_by_evidence(
 
 def no_filter(model: LinearModel, maneuvers: Sequence[Maneuver]) -> str:
     """Return why no Kalman filter fits this model to these data; empty where one does."""
-    slow = too_slow(maneuvers)
-    if slow:
-        return slow
+    why = too_slow(maneuvers) or no_clock(model, maneuvers)
+    if why:
+        return why
     if model.known_noise:
         return "a filter estimates the noise, and this one is known"
     if isinstance(model, NonlinearModel) and not model.process_noise:
