@@ -36,7 +36,7 @@ class Maneuver:
     name : str
         What the report calls it.
     sampled : Array or None, shape (samples, n_outputs)
-        At which samples each output was measured; between them a line stands. None: at all.
+        At which samples each output was measured; between them a curve stands. None: at all.
     resolution : Array or None, shape (n_outputs,)
         Step of each output's numbers, 0 where none is known.
 
