@@ -12,7 +12,7 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model_file import model_from
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.numerics.equation_filter_problem import EquationFilterProblem
-from host.sysid.numerics.filter_problem import discrete_noise
+from host.sysid.numerics.process_noise import discrete_noise
 from scipy import linalg
 from scipy.signal import lfilter
 

@@ -75,7 +75,7 @@ def test_gradient_and_information_are_those_of_differences() -> None:
         width[k] = 1e-4 / max(size[k], 1e-3)
         up, down = (known(problem.evaluate(theta + s * width)) for s in (1.0, -1.0))
         slope.append((down.cost - up.cost) / (2.0 * width[k]))
-        W = here.gains[0.02].whitener
+        W = here.filters[0].whitener
         moved = [(a - b) / (2.0 * width[k]) @ W.T for a, b in zip(up.e, down.e, strict=True)]
         white.append(np.concatenate(moved).ravel())
         spread.append((W @ (up.filters[0].S - down.filters[0].S) @ W.T / (2.0 * width[k])).ravel())

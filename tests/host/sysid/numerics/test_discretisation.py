@@ -7,9 +7,9 @@ import pytest
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import DelayGroup, LinearModel, Parameter, Term
 from host.sysid.numerics.ar_noise import ArNoise, ar_filter, autocovariance
-from host.sysid.numerics.filter_problem import discrete_noise
 from host.sysid.numerics.fractional_delay import delay_columns, slope_by_delay
 from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics.process_noise import discrete_noise
 from scipy import linalg, signal
 
 STATES = ("alpha_rad", "q_radps")

@@ -8,12 +8,13 @@ from host.arrays import BoolArray
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
 from host.sysid.numerics.discretisation import discretise
-from host.sysid.numerics.filter_problem import FilterProblem, InnovationLikelihood, discrete_noise
+from host.sysid.numerics.filter_problem import FilterProblem, InnovationLikelihood
 from host.sysid.numerics.filter_scoring import (
     fisher_scoring,
     total_information,
     whitened_innovation_sensitivities,
 )
+from host.sysid.numerics.process_noise import discrete_noise
 from host.sysid.numerics.restricted_likelihood import half_log_determinants
 from scipy import stats
 
@@ -148,9 +149,9 @@ def test_what_is_all_measured_is_the_steady_filter() -> None:
         for m in (whole, replace(whole, sampled=seen))
     )
     np.testing.assert_allclose(late.e[0][:-1], plain.e[0][:-1], rtol=1e-9, atol=1e-11)
-    white = plain.whitened(0, plain.uncorrelated(0))
+    white = plain.whitened(0, plain.as_filtered(0))
     np.testing.assert_allclose(
-        late.whitened(0, late.uncorrelated(0))[:-1], white[:-1], rtol=1e-7, atol=1e-9
+        late.whitened(0, late.as_filtered(0))[:-1], white[:-1], rtol=1e-7, atol=1e-9
     )
 
 
@@ -171,7 +172,7 @@ def test_gradient_and_slopes_are_those_of_differences() -> None:
         up, down = (known(problem.evaluate(theta + s * width)) for s in (1.0, -1.0))
         slope = (down.cost - up.cost) / (2.0 * width[k])
         assert gradient[k] / size[k] == pytest.approx(slope / size[k], abs=1e-4), name
-        moved = (up.uncorrelated(0) - down.uncorrelated(0)) / (2.0 * width[k])
+        moved = (up.as_filtered(0) - down.as_filtered(0)) / (2.0 * width[k])
         np.testing.assert_allclose(
             exact[:, :, k] / size[k], here.whitened(0, moved) / size[k], atol=1e-6, err_msg=name
         )

@@ -15,8 +15,9 @@ from host.sysid.numerics.ar_noise import (
     fit_ar,
     lagged_moments,
 )
-from host.sysid.numerics.filter_problem import FilterProblem, discrete_noise
+from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics.process_noise import discrete_noise
 from host.sysid.numerics.riccati import predicted_covariance
 from scipy import signal
 from statsmodels.regression.linear_model import yule_walker
@@ -123,7 +124,7 @@ def test_likelihood_and_innovations_of_filter_error_are_those_of_statsmodels() -
     constant = 0.5 * maneuver.outputs.size * np.log(2.0 * np.pi)
     assert -point.cost - constant == pytest.approx(float(output.llf), rel=1e-9)
     # python-control's gain predicts: it has the transition in it.
-    np.testing.assert_allclose(F @ point.gains[maneuver.dt_s].K, gain, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(F @ point.filters[0].K, gain, rtol=1e-6, atol=1e-9)
 
 
 def test_riccati_and_process_noise_are_those_of_python_control() -> None:

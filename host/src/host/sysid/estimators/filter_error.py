@@ -106,7 +106,7 @@ def fit_filter_error(
     theta, point = found.theta, found.trial
     factor: Array = np.ones(len(theta))
     if hac:
-        white = [point.whitened(k, point.uncorrelated(k)) for k in range(len(maneuvers))]
+        white = [point.whitened(k, point.as_filtered(k)) for k in range(len(maneuvers))]
         steps_s = [m.dt_s for m in maneuvers]
         factor = hac_inflation(
             whitened_innovation_sensitivities(problem, theta, point), white, steps_s, covariance

@@ -144,7 +144,7 @@ def _moved(maneuver: Maneuver, shifts_s: Array) -> Maneuver:
     to the nearest sample."""
     t, rows = maneuver.time_s, np.arange(maneuver.samples)
     columns = [np.interp(t + s, t, y) for s, y in zip(shifts_s, maneuver.outputs.T, strict=True)]
-    if maneuver.sampled is None or not maneuver.held:
+    if maneuver.sampled is None:
         return replace(maneuver, outputs=np.column_stack(columns))
     sampled = np.ones_like(maneuver.sampled)
     for j, steps in enumerate(np.round(shifts_s / maneuver.dt_s).astype(np.int64)):

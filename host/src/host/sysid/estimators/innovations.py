@@ -63,7 +63,7 @@ class Innovations:
         point = FilterProblem(model, changed, self.process).evaluate(self.theta)
         if point is None:
             return None
-        return [point.uncorrelated(k) for k in range(len(changed))]
+        return [point.as_filtered(k) for k in range(len(changed))]
 
     def coloured_covariance(self) -> Array:
         """Return the covariance corrected for coloured innovations; no variance becomes smaller.
@@ -104,8 +104,16 @@ def innovations_of(
     inverse[:count, :count] = covariance_from_information(
         np.diag(problem.output_problem.prior_precision) + sum(J.T @ J for J in model_sensitivities)
     )
-    e, seen = [point.uncorrelated(k) for k in range(len(maneuvers))], sampled_of(maneuvers)
-    return Innovations(theta, covariance, inverse, process, e, point.whitened, seen, sensitivities)
+    return Innovations(
+        theta=theta,
+        covariance=covariance,
+        inverse=inverse,
+        process=process,
+        e=[point.as_filtered(k) for k in range(len(maneuvers))],
+        whiten=point.whitened,
+        sampled=[m.sampled for m in maneuvers],
+        sensitivities=sensitivities,
+    )
 
 
 def _of_equations(
@@ -128,20 +136,15 @@ def _of_equations(
         np.diag(problem.output_problem.prior_precision) + sum(J.T @ J for J in shared)
     )
     return Innovations(
-        theta,
-        result.covariance_white,
-        inverse,
-        process,
-        point.scaled,
-        lambda _, e: e,
-        sampled_of(maneuvers),
-        slopes,
+        theta=theta,
+        covariance=result.covariance_white,
+        inverse=inverse,
+        process=process,
+        e=point.scaled,
+        whiten=lambda _, e: e,
+        sampled=[m.sampled for m in maneuvers],
+        sensitivities=slopes,
     )
-
-
-def sampled_of(maneuvers: Sequence[Maneuver]) -> list[BoolArray | None]:
-    """Return at which samples the outputs of each were measured; None: at all."""
-    return [m.sampled if m.held else None for m in maneuvers]
 
 
 def score_covariances(

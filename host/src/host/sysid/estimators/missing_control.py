@@ -15,11 +15,7 @@ from scipy import special
 
 from host.arrays import Array
 from host.sysid.estimators.gust_model import gust_model
-from host.sysid.estimators.innovations import (
-    PROCESS,
-    sampled_of,
-    score_covariances,
-)
+from host.sysid.estimators.innovations import PROCESS, score_covariances
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
@@ -98,9 +94,9 @@ def missing_control(
     )
     coloured = np.zeros_like(information)
     slopes = whitened_innovation_sensitivities(problem, theta, point)
-    for k, (J, seen) in enumerate(zip(slopes, sampled_of(maneuvers), strict=True)):
-        white = point.whitened(k, point.uncorrelated(k))
-        for part in score_covariances(white, J, seen):
+    for k, (J, m) in enumerate(zip(slopes, maneuvers, strict=True)):
+        white = point.whitened(k, point.as_filtered(k))
+        for part in score_covariances(white, J, m.sampled):
             coloured += part
     new = np.zeros(len(theta), dtype=bool)
     new[first : first + count] = True

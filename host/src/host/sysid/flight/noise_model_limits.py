@@ -21,12 +21,12 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.ar_noise import ArNoise, fit_ar, lagged_moments
-from host.sysid.numerics.filter_problem import air_states, discrete_noise, steady_covariance
 from host.sysid.numerics.input_coherence import (
     HIGHEST_ORDER,
     block_length,
     block_means,
 )
+from host.sysid.numerics.process_noise import air_states, discrete_noise, steady_covariance
 from host.sysid.numerics.score_variance import variance_ratio
 
 SIGNIFICANCE = 0.01

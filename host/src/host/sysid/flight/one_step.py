@@ -188,8 +188,8 @@ def _of_innovations(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim
     )
 
 
-def _whitened(residuals: Sequence[Array], answer: Innovations) -> list[Array]:
-    return [answer.whiten(k, e).ravel() for k, e in enumerate(residuals)]
+def _whitened(residuals: Sequence[Array], found: Innovations) -> list[Array]:
+    return [found.whiten(k, e).ravel() for k, e in enumerate(residuals)]
 
 
 def _of_outputs(result: FitResult, maneuvers: Sequence[Maneuver]) -> OneStep | None:

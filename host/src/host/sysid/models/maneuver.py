@@ -36,7 +36,8 @@ class Maneuver:
     name : str
         What the report calls it.
     sampled : Array or None, shape (samples, n_outputs)
-        At which samples each output was measured; between them a curve stands. None: at all.
+        At which samples each output was measured; between them a curve stands. None: at all,
+        and what is given of such a maneuver becomes None.
     resolution : Array or None, shape (n_outputs,)
         Step of each output's numbers, 0 where none is known.
 
@@ -86,6 +87,8 @@ class Maneuver:
             raise IdentificationError(
                 f"{self.name}: sampled is {self.sampled.shape}, outputs {self.outputs.shape}"
             )
+        if self.sampled is not None and self.sampled.all():
+            object.__setattr__(self, "sampled", None)
         if len(self.outputs) < 8:
             raise IdentificationError(
                 f"{self.name}: {len(self.outputs)} samples, at least 8 are needed"
@@ -101,7 +104,7 @@ class Maneuver:
     @property
     def held(self) -> bool:
         """Whether an output was measured at some of the samples only."""
-        return self.sampled is not None and not bool(self.sampled.all())
+        return self.sampled is not None
 
     @property
     def time_s(self) -> Array:

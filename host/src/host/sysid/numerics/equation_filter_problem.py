@@ -19,8 +19,8 @@ from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.numerics.equation_filter import filter_equations
-from host.sysid.numerics.filter_problem import air_states, steady_covariance
 from host.sysid.numerics.nonlinear_problem import Given, NonlinearProblem, finite
+from host.sysid.numerics.process_noise import air_states, steady_covariance
 
 STEP_BOUNDS = 1e-4  # of a bound: differences
 LOG_STEP = 1e-5  # of a logarithm of a deviation
@@ -190,7 +190,7 @@ class EquationFilterProblem:
         inputs = g.inputs.shape[1]
         none = np.full(max(n, outputs, inputs), -1, dtype=np.int64)
         seen = np.ones(maneuver.outputs.shape, dtype=bool)
-        if maneuver.held and maneuver.sampled is not None:
+        if maneuver.sampled is not None:
             seen = np.ascontiguousarray(maneuver.sampled)
         e, white, power = (np.empty(maneuver.outputs.shape) for _ in range(3))
         delay_s = np.array([0.0 if k < 0 else theta[k] for k in self._late])

@@ -10,9 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg
 
-from host.arrays import Array
+from host.arrays import Array, IntArray
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
@@ -23,6 +22,7 @@ from host.sysid.numerics.intermittent_filter import (
     filter_intermittent,
 )
 from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics.process_noise import discrete_noise
 from host.sysid.numerics.riccati import filter_innovations, predicted_covariance
 
 SAME_PERIOD = 1e-9
@@ -67,11 +67,9 @@ class InnovationLikelihood:
     e : list of Array, shape (samples, p)
         Innovations per maneuver, zero where nothing was measured.
     filters : list of SteadyStateFilter
-        Of each maneuver, all outputs measured.
+        Of each maneuver, all outputs measured; the same for all of one sample period.
     intermittent : list of IntermittentInnovations or None
         Of each maneuver some of whose outputs were not measured at every sample.
-    gains : dict
-        Filter of each sample period.
     cost : float
         Negative log likelihood and prior, up to a constant.
     """
@@ -80,16 +78,19 @@ class InnovationLikelihood:
     e: list[Array]
     filters: list[SteadyStateFilter]
     intermittent: list[IntermittentInnovations | None]
-    gains: dict[float, SteadyStateFilter]  # per sample period
     cost: float
 
-    def uncorrelated(self, number: int) -> Array:
-        """Return innovations of a maneuver whose mixture `whitened` removes, (samples, p)."""
+    def as_filtered(self, number: int) -> Array:
+        """Return innovations of a maneuver as its filter makes them, (samples, p).
+
+        The steady filter takes all outputs of a sample at once, and they are correlated by S; the
+        intermittent one takes them in turn.
+        """
         missing = self.intermittent[number]
         return self.e[number] if missing is None else missing.independent
 
     def whitened(self, number: int, innovations: Array) -> Array:
-        """Return innovations of a maneuver, those of `uncorrelated`, with unit variance."""
+        """Return innovations of a maneuver, those of `as_filtered`, with unit variance."""
         missing = self.intermittent[number]
         if missing is None:
             return np.asarray(innovations @ self.filters[number].whitener.T)
@@ -153,6 +154,11 @@ class FilterProblem:
             intensity[self.process_index] = np.exp(2.0 * theta[self.n_model : split])
             return intensity, np.exp(2.0 * theta[split:])
 
+    def columns(self, maneuver: int) -> IntArray:
+        """Return which unknowns the innovations of a maneuver depend on."""
+        noise = np.arange(self.n_model, len(self.names))
+        return np.concatenate([self.output_problem.columns(maneuver), noise])
+
     def constants(self, theta: Array, maneuver: int) -> tuple[Array, Array, Array]:
         """Return biases of states and outputs, and initial states of a maneuver."""
         model = self.model
@@ -188,8 +194,8 @@ class FilterProblem:
         if not (np.isfinite(intensity).all() and np.isfinite(power).all()):
             return None
         none = np.zeros(0, dtype=np.int64)
-        gains: dict[float, SteadyStateFilter] = {}
-        likelihood = InnovationLikelihood([], [], [], [], gains, 0.0)
+        of_period: dict[float, SteadyStateFilter] = {}
+        likelihood = InnovationLikelihood(z=[], e=[], filters=[], intermittent=[], cost=0.0)
         for number, maneuver in enumerate(self.maneuvers):
             rate, bias, start = self.constants(theta, number)
             AB[:, -1] = rate
@@ -197,13 +203,13 @@ class FilterProblem:
                 AB, n, m, model.hold == "foh", maneuver.dt_s, none, none, none, np.zeros(0), 0
             )
             period_s = self.periods_s[number]
-            gain = gains.get(period_s) or steady_state_filter(
+            steady = of_period.get(period_s) or steady_state_filter(
                 A, C, intensity, np.diag(power), period_s
             )
-            if gain is None:
+            if steady is None:
                 return None
-            gains[period_s] = gains[maneuver.dt_s] = gain
-            likelihood.filters.append(gain)
+            of_period[period_s] = steady
+            likelihood.filters.append(steady)
             run = self._intermittent if maneuver.held else self._steady
             if not run(likelihood, step, CD, power, start, bias):
                 return None
@@ -244,13 +250,23 @@ class FilterProblem:
         start: Array,
         bias: Array,
     ) -> bool:
-        """Add the next maneuver, outputs missing; it begins as if none had been before."""
-        number, gain = len(likelihood.e), likelihood.filters[-1]
+        """Add the next maneuver, outputs missing; return whether the filter did not fail.
+
+        It begins as if all outputs had been measured before the first sample.
+        """
+        number, steady = len(likelihood.e), likelihood.filters[-1]
         found = filter_intermittent(
-            FilterEquations.of_values(step, CD, bias, gain.Q, power, start, gain.P),
+            FilterEquations.of_values(
+                step=step,
+                CD=CD,
+                bias=bias,
+                Q=steady.Q,
+                variance=power,
+                start=start,
+                P=steady.P,
+            ),
             self.drives[number],
-            self.maneuvers[number].outputs,
-            np.asarray(self.maneuvers[number].sampled),
+            self.maneuvers[number],
         )
         if found is None:
             return False
@@ -301,59 +317,3 @@ def steady_state_filter(
         return SteadyStateFilter(F, Qd, P, S, np.linalg.inv(factor), K)
     except np.linalg.LinAlgError:
         return None
-
-
-def air_states(states: Sequence[str]) -> list[int]:
-    """Return which states are air, which moves already when a record begins: ``gust...``."""
-    return [k for k, name in enumerate(states) if name.startswith("gust")]
-
-
-def steady_covariance(A: Array, intensity: Array) -> Array:
-    """Return the covariance that white process noise sustains; zero of states that do not decay.
-
-    Parameters
-    ----------
-    A : Array, shape (n, n)
-    intensity : Array, shape (n,)
-        Spectral density of the noise in each rate.
-    """
-    if not len(A) or np.max(np.linalg.eigvals(A).real) >= 0.0:
-        return np.zeros_like(A)
-    # A P + P A' + Q = 0 (Bryson & Ho, Applied Optimal Control, sec. 11.4).
-    return np.asarray(linalg.solve_continuous_lyapunov(A, -np.diag(intensity)))
-
-
-def discrete_noise(A: Array, intensity: Array, dt_s: float) -> tuple[Array, Array]:
-    """Return F over a sample and Q, the covariance that white process noise adds in it.
-
-    Q is the integral of exp(A t) W exp(A' t) over the sample, computed exactly from the exponential
-    of [[-A, W], [0, A']] (EQUATIONS.md, eq. 30). A trapezoid
-    instead biases Cl_p by 5 % in rolling gusts at 50 Hz.
-
-    Parameters
-    ----------
-    A : Array, shape (n, n)
-    intensity : Array, shape (n,)
-        Spectral density of each state's noise, unit of the state squared per second.
-    dt_s : float
-        Sample period, s.
-    """
-    n = len(A)
-    none = np.zeros(0, dtype=np.int64)
-    E, _ = discretise(
-        van_loan(A, intensity), 2 * n, 0, False, dt_s, none, none, none, np.zeros(0), 0
-    )
-    F = np.ascontiguousarray(E[n:, n : 2 * n].T)
-    with np.errstate(over="ignore", invalid="ignore"):  # of a model that diverges within a sample
-        Qd = F @ E[:n, n : 2 * n]
-    return F, 0.5 * (Qd + Qd.T)
-
-
-def van_loan(A: Array, intensity: Array) -> Array:
-    """Return [-A Q; 0 A'] and a column of zeros: its exponential holds the covariance."""
-    n = len(A)
-    block = np.zeros((2 * n, 2 * n + 1))
-    block[:n, :n] = -A
-    block[:n, n : 2 * n] = np.diag(intensity)
-    block[n:, n : 2 * n] = A.T
-    return block

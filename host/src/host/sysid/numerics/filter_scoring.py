@@ -7,21 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.sysid.identification_error import IdentificationError
-from host.sysid.numerics.filter_problem import (
-    FilterProblem,
-    InnovationLikelihood,
-    SteadyStateFilter,
-)
+from host.sysid.numerics.filter_problem import FilterProblem, InnovationLikelihood
 from host.sysid.numerics.filter_sensitivities import (
     GainSensitivities,
     gain_sensitivities,
-    intermittent_columns,
-    intermittent_innovations,
     maneuver_sensitivities,
     matrix_sensitivities,
 )
-from host.sysid.numerics.intermittent_filter import IntermittentInnovations
+from host.sysid.numerics.intermittent_scoring import intermittent_scoring, intermittent_slopes
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.recursion import propagate
 
@@ -49,35 +42,41 @@ def fisher_scoring(
     list of Array, shape (P,)
         Negative gradients.
     """
-    size = len(theta)
     matrices = matrix_sensitivities(problem.model, theta)
     gains = _gain_sensitivities(problem, theta, point, matrices)
-    parts: list[Array] = []
-    scores: list[Array] = []
-    for number, maneuver in enumerate(problem.maneuvers):
-        gain, by = point.gains[maneuver.dt_s], gains[maneuver.dt_s]
-        active = _active(problem, number)
-        if point.intermittent[number] is not None:
-            information, gradient = _intermittent_scoring(problem, theta, number, gain, by)
-            parts.append(information)
-            scores.append(gradient)
-            continue
-        J = _innovation_sensitivities(problem, theta, point, number, by, matrices)
-        white = point.e[number] @ gain.whitener.T
-        information, gradient = np.zeros((size, size)), np.zeros(size)
-        information[np.ix_(active, active)] = J.T @ J
-        gradient[active] = -(J.T @ white.ravel())
-        # The gain depends only on the unknowns that all maneuvers share.
-        shared = _shared(problem)
-        spread = gain.whitener @ by.S @ gain.whitener.T
-        trace = np.trace(spread, axis1=1, axis2=2)
-        outer = white.T @ white
-        gradient[shared] -= 0.5 * (len(white) * trace - np.sum(spread * outer, axis=(1, 2)))
-        flat = spread.reshape(len(shared), -1)
-        information[np.ix_(shared, shared)] += 0.5 * len(white) * (flat @ flat.T)
-        parts.append(information)
-        scores.append(gradient)
-    return parts, scores
+    found = [
+        _steady_scoring(problem, theta, point, number, by, matrices)
+        if point.intermittent[number] is None
+        else intermittent_scoring(problem, theta, number, point.filters[number], by)
+        for number, by in enumerate(gains)
+    ]
+    return [information for information, _ in found], [gradient for _, gradient in found]
+
+
+def _steady_scoring(
+    problem: FilterProblem,
+    theta: Array,
+    point: InnovationLikelihood,
+    number: int,
+    by: GainSensitivities,
+    matrices: tuple[Array, Array, Array],
+) -> tuple[Array, Array]:
+    """Return information and negative gradient of a maneuver that is measured at every sample."""
+    steady, active = point.filters[number], problem.columns(number)
+    J = _innovation_sensitivities(problem, theta, point, number, by, matrices)
+    white = point.e[number] @ steady.whitener.T
+    information, gradient = np.zeros((len(theta), len(theta))), np.zeros(len(theta))
+    information[np.ix_(active, active)] = J.T @ J
+    gradient[active] = -(J.T @ white.ravel())
+    # The gain depends only on the unknowns that all maneuvers share.
+    shared = _shared(problem)
+    spread = steady.whitener @ by.S @ steady.whitener.T
+    trace = np.trace(spread, axis1=1, axis2=2)
+    outer = white.T @ white
+    gradient[shared] -= 0.5 * (len(white) * trace - np.sum(spread * outer, axis=(1, 2)))
+    flat = spread.reshape(len(shared), -1)
+    information[np.ix_(shared, shared)] += 0.5 * len(white) * (flat @ flat.T)
+    return information, gradient
 
 
 def whitened_innovation_sensitivities(
@@ -87,14 +86,13 @@ def whitened_innovation_sensitivities(
     matrices = matrix_sensitivities(problem.model, theta)
     gains = _gain_sensitivities(problem, theta, point, matrices)
     found: list[Array] = []
-    for number, (e, maneuver) in enumerate(zip(point.e, problem.maneuvers, strict=True)):
+    for number, (e, by) in enumerate(zip(point.e, gains, strict=True)):
         slopes = np.zeros((e.size, len(theta)))
-        gain, by = point.gains[maneuver.dt_s], gains[maneuver.dt_s]
         if point.intermittent[number] is not None:
-            run, columns = _intermittent(problem, theta, number, gain, by)
+            run, columns = intermittent_slopes(problem, theta, number, point.filters[number], by)
             slopes[:, columns] = run.by_independent.reshape(e.size, -1)
         else:
-            slopes[:, _active(problem, number)] = _innovation_sensitivities(
+            slopes[:, problem.columns(number)] = _innovation_sensitivities(
                 problem, theta, point, number, by, matrices
             )
         found.append(slopes.reshape(*e.shape, -1))
@@ -106,68 +104,22 @@ def _gain_sensitivities(
     theta: Array,
     point: InnovationLikelihood,
     matrices: tuple[Array, Array, Array],
-) -> dict[float, GainSensitivities]:
+) -> list[GainSensitivities]:
+    """Return those of every maneuver's filter, found once for each sample period."""
     AB_slopes, _, CD_slopes = matrices
-    rows_known: dict[int, GainSensitivities] = {}
-    for dt_s, gain in point.gains.items():
-        if id(gain) not in rows_known:
-            rows_known[id(gain)] = gain_sensitivities(
-                problem, theta, gain, dt_s, AB_slopes, CD_slopes
+    of_period: dict[float, GainSensitivities] = {}
+    for period_s, steady in zip(problem.periods_s, point.filters, strict=True):
+        if period_s not in of_period:
+            of_period[period_s] = gain_sensitivities(
+                problem, theta, steady, period_s, AB_slopes, CD_slopes
             )
-    return {dt_s: rows_known[id(gain)] for dt_s, gain in point.gains.items()}
-
-
-def _active(problem: FilterProblem, number: int) -> IntArray:
-    """Return which unknowns the innovations of a maneuver depend on."""
-    noise = np.arange(problem.n_model, len(problem.names))
-    return np.concatenate([problem.output_problem.columns(number), noise])
+    return [of_period[period_s] for period_s in problem.periods_s]
 
 
 def _shared(problem: FilterProblem) -> IntArray:
     return np.concatenate(
         [np.arange(problem.output_problem.n_common), np.arange(problem.n_model, len(problem.names))]
     )
-
-
-def _intermittent(
-    problem: FilterProblem,
-    theta: Array,
-    number: int,
-    gain: SteadyStateFilter,
-    by: GainSensitivities,
-) -> tuple[IntermittentInnovations, IntArray]:
-    """Return innovations of a maneuver with missing outputs, and which unknowns their slopes are
-    by."""
-    run = intermittent_innovations(problem, theta, number, gain, by)
-    if run is None:  # it ran at this very point without slopes
-        raise IdentificationError(f"model {problem.model.name}: the Kalman filter has no slopes")
-    outputs, active = problem.output_problem, _active(problem, number)
-    return run, active[intermittent_columns(outputs.n_common, outputs.n_local, len(active))]
-
-
-def _intermittent_scoring(
-    problem: FilterProblem,
-    theta: Array,
-    number: int,
-    gain: SteadyStateFilter,
-    by: GainSensitivities,
-) -> tuple[Array, Array]:
-    """Return information and negative gradient of a maneuver with missing outputs.
-
-    Of an innovation w of variance s, given those before, the information is dw dw / s + ds ds /
-    (2 s^2).
-    """
-    run, columns = _intermittent(problem, theta, number, gain, by)
-    white = run.white.ravel()
-    J = run.by_independent.reshape(white.size, -1)
-    spread = run.by_variance.reshape(white.size, -1)
-    shared = columns[: spread.shape[1]]
-    information, gradient = np.zeros((len(theta), len(theta))), np.zeros(len(theta))
-    information[np.ix_(columns, columns)] = J.T @ J
-    information[np.ix_(shared, shared)] += 0.5 * spread.T @ spread
-    gradient[columns] = -(J.T @ white)
-    gradient[shared] -= 0.5 * spread.T @ (1.0 - white**2)
-    return information, gradient
 
 
 def _innovation_sensitivities(
@@ -178,11 +130,11 @@ def _innovation_sensitivities(
     by: GainSensitivities,
     matrices: tuple[Array, Array, Array],
 ) -> Array:
-    """Return sensitivities of the whitened innovations, (samples x p, `_active`)."""
+    """Return sensitivities of the whitened innovations, (samples x p, own columns)."""
     _, CD, CD_slopes = matrices
     model, output_problem = problem.model, problem.output_problem
     n, p = len(model.states), len(model.outputs)
-    gain: SteadyStateFilter = point.gains[problem.maneuvers[number].dt_s]
+    gain = point.filters[number]
     common, local = output_problem.n_common, output_problem.n_local
     width = common + local + len(theta) - problem.n_model
     noise = slice(common + local, width)

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from host.arrays import Array, IntArray
+from host.arrays import Array
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.discretisation import discretise
-from host.sysid.numerics.filter_problem import FilterProblem, SteadyStateFilter, van_loan
-from host.sysid.numerics.intermittent_filter import (
-    FilterEquations,
-    IntermittentInnovations,
-    filter_intermittent,
-)
+from host.sysid.numerics.filter_problem import FilterProblem, SteadyStateFilter
+from host.sysid.numerics.process_noise import van_loan
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,49 +142,6 @@ def maneuver_sensitivities(
     for state, name in model.shared_starts:
         start[model.states.index(state), problem.names.index(name)] = 1.0
     return ManeuverSensitivities(step, by_step, direct, start)
-
-
-def intermittent_innovations(
-    problem: FilterProblem,
-    theta: Array,
-    number: int,
-    gain: SteadyStateFilter,
-    by: GainSensitivities | None = None,
-) -> IntermittentInnovations | None:
-    """Run the filter of `intermittent_filter` over a maneuver with slopes; None if it fails.
-
-    Their columns are `intermittent_columns`; without sensitivities of the gain its constants alone.
-    """
-    maneuver, outputs = problem.maneuvers[number], problem.output_problem
-    if maneuver.sampled is None:
-        return None
-    _, CD, CD_slopes = matrix_sensitivities(problem.model, theta)
-    one = maneuver_sensitivities(problem, theta, number, CD_slopes)
-    common = outputs.n_common
-    columns = common + np.arange(outputs.n_local)
-    if by is not None:
-        columns = intermittent_columns(common, outputs.n_local, one.start.shape[1])
-    by_step = np.zeros((*one.step.shape, one.start.shape[1]))
-    by_step[:, :, : one.by_step.shape[2]] = one.by_step
-    _, bias, start = problem.constants(theta, number)
-    _, power = problem.noise(theta)
-    values = FilterEquations.of_values(one.step, CD, bias, gain.Q, power, start, gain.P)
-    slopes = replace(
-        values,
-        by_step=np.ascontiguousarray(by_step[:, :, columns]),
-        by_read=np.ascontiguousarray(one.direct.transpose(1, 0, 2)[:, :, columns]),
-        by_start=np.ascontiguousarray(one.start[:, columns]),
-    )
-    if by is not None:
-        Q_slopes, P_slopes = (np.ascontiguousarray(x.transpose(1, 2, 0)) for x in (by.Q, by.P))
-        slopes = replace(slopes, Q_slopes=Q_slopes, P_slopes=P_slopes)
-    return filter_intermittent(slopes, problem.drives[number], maneuver.outputs, maneuver.sampled)
-
-
-def intermittent_columns(common: int, local: int, width: int) -> IntArray:
-    """Return the unknowns of a maneuver, its own constants last: they move its states alone."""
-    constants = common + np.arange(local)
-    return np.concatenate([np.arange(common), np.arange(common + local, width), constants])
 
 
 def _noise_sensitivities(

@@ -60,7 +60,15 @@ class FilterEquations:
 
     @classmethod
     def of_values(
-        cls, step: Array, CD: Array, bias: Array, Q: Array, variance: Array, start: Array, P: Array
+        cls,
+        *,
+        step: Array,
+        CD: Array,
+        bias: Array,
+        Q: Array,
+        variance: Array,
+        start: Array,
+        P: Array,
     ) -> FilterEquations:
         """Return equations without slopes; biases of the outputs act behind the inputs."""
         n, wide = step.shape
@@ -69,7 +77,17 @@ class FilterEquations:
         none = np.zeros((n, wide, 0))
         by_read, square = np.zeros((*read.shape, 0)), np.zeros((n, n, 0))
         return cls(
-            step, none, read, by_read, Q, square, variance, start, np.zeros((n, 0)), P, square
+            step=step,
+            by_step=none,
+            read=read,
+            by_read=by_read,
+            Q=Q,
+            Q_slopes=square,
+            variance=variance,
+            start=start,
+            by_start=np.zeros((n, 0)),
+            P=P,
+            P_slopes=square,
         )
 
 
@@ -103,9 +121,15 @@ class IntermittentInnovations:
         """Negative log likelihood, up to a constant."""
         return 0.5 * float(np.sum(self.white**2 + np.log(self.variance)))
 
+    @property
+    def information(self) -> Array:
+        """What the innovations say on the unknowns, their variance known, (L, L)."""
+        J = self.by_independent.reshape(-1, self.by_independent.shape[-1])
+        return np.asarray(J.T @ J)
+
 
 def filter_intermittent(
-    equations: FilterEquations, drive: Array, measured: Array, sampled: BoolArray
+    equations: FilterEquations, drive: Array, maneuver: Maneuver
 ) -> IntermittentInnovations | None:
     """Run the filter over one maneuver; None if it fails.
 
@@ -113,16 +137,18 @@ def filter_intermittent(
     ----------
     equations : FilterEquations
     drive : Array, shape (samples, w)
-    measured, sampled : Array, shape (samples, p)
-        What was measured, and whether.
+    maneuver : Maneuver
+        Its outputs, and at which samples each was measured.
     """
-    q, size = equations, measured.shape
+    q, measured = equations, maneuver.outputs
+    size, seen = measured.shape, maneuver.sampled
+    sampled = np.ones(size, dtype=bool) if seen is None else seen
     found = IntermittentInnovations(
-        np.zeros(size),
-        np.zeros(size),
-        np.ones(size),
-        np.zeros((*size, q.by_start.shape[1])),
-        np.zeros((*size, q.P_slopes.shape[2])),
+        e=np.zeros(size),
+        independent=np.zeros(size),
+        variance=np.ones(size),
+        by_independent=np.zeros((*size, q.by_start.shape[1])),
+        by_variance=np.zeros((*size, q.P_slopes.shape[2])),
     )
     done = _filter(
         q.step, q.by_step, q.read, q.by_read, q.Q, q.Q_slopes, q.variance, q.start.copy(),
@@ -154,28 +180,24 @@ def no_clock(model: LinearModel, maneuvers: Sequence[Maneuver]) -> str:
 
 
 @compiled_part
-def take_output(
-    x: Array,
-    by_x: Array,
+def innovation_variance(
     P: Array,
     P_slopes: Array,
     h: Array,
     by_h: Array,
-    left: float,
-    by_left: Array,
     variance: float,
     noise: int,
     Ph: Array,
     by_Ph: Array,
     by_spread: Array,
 ) -> float:
-    """Correct state and covariance by one output; return the variance of its innovation `left`.
+    """Return the variance h' P h + `variance` of an output's innovation.
 
     `h` (n,) and `by_h` (n, L) are its row of C; column `noise` is the logarithm of its deviation.
-    `by_left` (L,) and `by_spread` (shared,) are overwritten by slopes over the deviation and over
-    the variance; `Ph` (n,) and `by_Ph` (n, shared) are work.
+    Overwritten are `Ph` (n,) by P h, `by_Ph` (n, shared) by its slopes, and `by_spread` (shared,)
+    by slopes of the variance over itself.
     """
-    n, shared = len(x), P_slopes.shape[2]
+    n, shared = len(P), P_slopes.shape[2]
     spread = variance
     for a in range(n):
         Ph[a] = 0.0
@@ -198,6 +220,33 @@ def take_output(
         by_spread[noise] += 2.0 * variance
     for q in range(shared):
         by_spread[q] /= spread
+    return spread
+
+
+@compiled_part
+def take_output(
+    x: Array,
+    by_x: Array,
+    P: Array,
+    P_slopes: Array,
+    h: Array,
+    by_h: Array,
+    left: float,
+    by_left: Array,
+    variance: float,
+    noise: int,
+    Ph: Array,
+    by_Ph: Array,
+    by_spread: Array,
+) -> float:
+    """Correct state and covariance by one output; return the variance of its innovation `left`.
+
+    `by_left` (L,) is overwritten by slopes over the deviation; else as `innovation_variance`.
+    """
+    n, shared = len(x), P_slopes.shape[2]
+    spread = innovation_variance(P, P_slopes, h, by_h, variance, noise, Ph, by_Ph, by_spread)
+    if not spread > 0.0:
+        return spread
     for a in range(n):
         gain = Ph[a] / spread
         x[a] += gain * left
@@ -229,9 +278,8 @@ def covariance_ahead(
 ) -> None:
     """Overwrite P and its slopes by F P F' + Q; `G` (n, n) and `by_G` (n, n, shared) are work."""
     n, shared = len(P), P_slopes.shape[2]
-    for i in range(
-        n
-    ):  # G = P F'; by_G = P_slopes F' / 2 + P by_F': F by_G and its transpose are all
+    # G = P F'; by_G = P_slopes F' / 2 + P by_F': F by_G and its transpose are all.
+    for i in range(n):
         for b in range(n):
             G[i, b] = 0.0
             for q in range(shared):
@@ -274,6 +322,23 @@ def state_ahead(x: Array, by_x: Array, step: Array, by_step: Array, z: Array, T:
         for c in range(n):
             for q in range(T.shape[1]):
                 by_x[i, q] += step[i, c] * T[c, q]
+
+
+@compiled_part
+def output_at(
+    x: Array, by_x: Array, drive: Array, h: Array, by_h: Array, by_innovation: Array
+) -> float:
+    """Return an output by its row `h` (n + w,) of state and drive, whose slopes `by_h` (n + w, L)
+    are; what it moves with the unknowns is taken off `by_innovation` (L,)."""
+    n, total, y = len(x), len(by_innovation), 0.0
+    for c in range(len(h)):
+        value = x[c] if c < n else drive[c - n]
+        y += h[c] * value
+        for q in range(total):
+            by_innovation[q] -= by_h[c, q] * value
+            if c < n:
+                by_innovation[q] -= h[c] * by_x[c, q]
+    return y
 
 
 @compiled
@@ -319,13 +384,7 @@ def _filter(
             if not sampled[k, j]:
                 continue
             left, by_left = measured[k, j], by_independent[k, j]
-            for c in range(wide):
-                now = x[c] if c < n else z[c]
-                left -= read[j, c] * now
-                for q in range(total):
-                    by_left[q] -= by_read[j, c, q] * now
-                    if c < n:
-                        by_left[q] -= read[j, c] * by_x[c, q]
+            left -= output_at(x, by_x, z[n:], read[j], by_read[j], by_left)
             independent[k, j] = left
             spread[k, j] = take_output(
                 x, by_x, P, P_slopes, read[j, :n], by_read[j, :n], left, by_left, variance[j],

@@ -97,7 +97,7 @@ class OutputProblem:
                 _Part(
                     drive=np.ascontiguousarray(np.hstack(columns)),
                     measured=np.ascontiguousarray(maneuver.outputs.T),
-                    missing=~np.asarray(maneuver.sampled).T if maneuver.held else None,
+                    missing=None if maneuver.sampled is None else ~maneuver.sampled.T,
                     index=index.astype(np.int64),
                     dt_s=maneuver.dt_s,
                 )
@@ -205,16 +205,25 @@ class OutputProblem:
         return np.asarray(result)
 
     def residual_deviation(self, residuals: Sequence[Array]) -> Array:
-        """Return the deviations of residuals of every maneuver, (p,); zeros of what was not
-        measured do not count."""
-        share = np.sqrt(self.samples / self.counts)
-        return np.asarray(np.maximum(share * np.std(np.hstack(residuals), axis=1), 1e-12))
+        """Return the deviation of every output's residuals where it was measured, (p,).
+
+        Parameters
+        ----------
+        residuals : sequence of Array, each (p, samples)
+            Of every maneuver, zero of what was not measured.
+        """
+        deviation = self._share_scale() * np.std(np.hstack(residuals), axis=1)
+        return np.asarray(np.maximum(deviation, 1e-12))
 
     def residual_covariance(self, residuals: Sequence[Array]) -> Array:
-        """Return the covariance of such residuals, (p, p)."""
-        scale = np.sqrt(self.samples / self.counts)
+        """Return the covariance of residuals as for `residual_deviation`, (p, p)."""
+        scale = self._share_scale()
         covariance = np.atleast_2d(np.cov(np.hstack(residuals)))
         return np.asarray(covariance * np.outer(scale, scale), dtype=np.float64)
+
+    def _share_scale(self) -> Array:
+        """Return what makes a deviation over all samples that over the measured ones, (p,)."""
+        return np.asarray(np.sqrt(self.samples / self.counts))
 
     def seen(self, maneuver: int, output: int) -> BoolArray | None:
         """Return at which samples of a maneuver an output was measured; None: at all."""

@@ -4,8 +4,8 @@ Biases and initial states are fitted to each. Slow noise looks like them and goe
 what is left seems quicker than it is, and the aircraft slower: on flights of an independent
 simulator, gusts of 1 m/s that roll the air, the lag of these was 17 % quick and L_p 7 % small, now
 5 and 2.5. The restricted cost has half the log determinant of the constants' information beside it
-(EQUATIONS.md, eq. 38). Innovations are linear in the constants, so that this needs no data: only
-the filter, and how long a maneuver is.
+(EQUATIONS.md, eq. 38). Innovations are linear in the constants, so that this needs no value
+of the data: only the filter, how long a maneuver is, and which samples were measured.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from host.sysid.numerics.filter_problem import (
     SteadyStateFilter,
     steady_state_filter,
 )
-from host.sysid.numerics.filter_sensitivities import intermittent_innovations
 from host.sysid.numerics.information_inverse import LEAST_IDENTIFIED
+from host.sysid.numerics.intermittent_scoring import intermittent_innovations
 
 STEP_BOUNDS = 0.01  # of a Cramer-Rao bound: differences
 LOG_STEP = 1e-3  # of a logarithm of a deviation, at most: noise that is not there has any bound
@@ -74,17 +74,12 @@ def half_log_determinants(problem: FilterProblem, theta: Array) -> Array:
         response = responses[period_s]
         if maneuver.held:
             run = intermittent_innovations(problem, theta, number, response.gain)
-            J = np.zeros((1, 1)) if run is None else _flat(run.by_independent)
-            found.append(_half_log_determinant(J.T @ J))
+            found.append(np.nan if run is None else _half_log_determinant(run.information))
             continue
         if (period_s, samples) not in known:
             known[period_s, samples] = response.half_log_determinant(samples)
         found.append(known[period_s, samples])
     return np.array(found)
-
-
-def _flat(slopes: Array) -> Array:
-    return slopes.reshape(-1, slopes.shape[-1])
 
 
 def _half_log_determinant(information: Array) -> float:
