@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import special
 
-from host.arrays import Array
+from host.arrays import Array, BoolArray
 from host.sysid.estimators.coherence_inflation import NoiseExcess
 from host.sysid.estimators.gust_model import gust_model
 from host.sysid.estimators.innovations import PROCESS
@@ -26,6 +26,7 @@ from host.sysid.numerics.input_coherence import (
     block_length,
     block_means,
 )
+from host.sysid.numerics.output_error_problem import OutputProblem, Response
 from host.sysid.numerics.process_noise import air_states, discrete_noise, steady_covariance
 from host.sysid.numerics.score_variance import variance_ratio
 
@@ -56,24 +57,16 @@ def excess_over_noise_model(
     problem, responses = free.problem, free.responses
     model, maneuvers = problem.model, problem.maneuvers
     wide = model if set(process) <= set(model.states) else gust_model(model, airspeed_mps)
-    count, outputs = problem.n_common, len(model.outputs)
+    outputs = len(model.outputs)
     observed, samples = np.zeros(outputs), 0
     squares = np.zeros((DRAWS, outputs))
     moments = np.zeros((outputs, HIGHEST_ORDER + 1, HIGHEST_ORDER + 1))
     rng = np.random.default_rng(DRAW_SEED)
     for number, (maneuver, response) in enumerate(zip(maneuvers, responses, strict=True)):
         block = block_length(maneuver.dt_s)
-        seen = maneuver.sampled if maneuver.held else None
-        left = block_means(problem.residual(number, response.y).T, block, seen)
-        slopes = np.stack(
-            [
-                block_means(J[:, count:], block, problem.seen(number, j))
-                for j, J in enumerate(response.sensitivities)
-            ]
-        )
+        left = block_means(problem.residual(number, response.y).T, block, maneuver.sampled)
+        slopes = slopes_of_means(problem, number, response)[:, :, problem.n_common :]
         errors_drawn = random_errors(rng, wide, result, process, maneuver, block)
-        if seen is not None:  # of a mean over nothing that was measured both are zero
-            errors_drawn *= block_means(np.ones(seen.shape), block, seen).T[:, :, None]
         for j, errors in enumerate(errors_drawn[:, :, :AR_DRAWS]):
             none = [np.zeros((len(errors), 0))] * AR_DRAWS
             moments[j] += lagged_moments(list(errors.T), none, HIGHEST_ORDER)
@@ -110,6 +103,8 @@ def random_errors(
 ) -> Array:
     """Return outputs of a model that process noise alone drives, and their noise, (p, n, draws).
 
+    Zero where nothing was measured of a mean, as its residual.
+
     Parameters
     ----------
     rng : numpy.random.Generator
@@ -142,7 +137,27 @@ def random_errors(
     for k in range(means):
         errors[:, k] += C @ x
         x = F @ x + root @ rng.standard_normal((len(A), DRAWS))
-    return np.asarray(errors)
+    return np.asarray(errors * measured_means(maneuver, block).T[:, :, None])
+
+
+def measured_means(maneuver: Maneuver, block: int) -> BoolArray:
+    """Return of which means over `block` samples anything was measured, (means, p)."""
+    seen = maneuver.sampled
+    if seen is None:
+        return np.ones((maneuver.samples // block, maneuver.outputs.shape[1]), dtype=bool)
+    whole = seen[: len(seen) // block * block].reshape(-1, block, seen.shape[1])
+    return np.asarray(whole.any(axis=1))
+
+
+def slopes_of_means(problem: OutputProblem, number: int, response: Response) -> Array:
+    """Return the sensitivities of what was measured of each mean of a maneuver, (p, means, own)."""
+    block = block_length(problem.maneuvers[number].dt_s)
+    return np.stack(
+        [
+            block_means(J, block, problem.seen(number, j))
+            for j, J in enumerate(response.sensitivities)
+        ]
+    )
 
 
 def _root(covariance: Array) -> Array:

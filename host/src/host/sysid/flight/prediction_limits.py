@@ -19,7 +19,12 @@ from scipy import special
 from host.arrays import Array
 from host.sysid.estimators.innovations import PROCESS
 from host.sysid.flight.free_simulation import free_responses, weighted_fit
-from host.sysid.flight.noise_model_limits import DRAWS, random_errors
+from host.sysid.flight.noise_model_limits import (
+    DRAWS,
+    measured_means,
+    random_errors,
+    slopes_of_means,
+)
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
@@ -79,12 +84,18 @@ def predictions(
     """
     if noise is None or not maneuvers:
         return {}
-    blocks = [block_length(m.dt_s) for m in maneuvers]
-    measured = [block_means(m.outputs, n) for m, n in zip(maneuvers, blocks, strict=True)]
-    modelled = [block_means(y, n) for y, n in zip(simulated, blocks, strict=True)]
-    error = np.vstack(measured) - np.vstack(modelled)
-    spread = np.sqrt(np.mean(np.vstack([y - y.mean(axis=0) for y in measured]) ** 2, axis=0))
-    rms = np.sqrt(np.mean(error**2, axis=0)) / np.maximum(spread, 1e-300)
+    errors, motions = [], []
+    for maneuver, y in zip(maneuvers, simulated, strict=True):
+        block = block_length(maneuver.dt_s)
+        seen = measured_means(maneuver, block)
+        measured, modelled = (
+            block_means(x, block, maneuver.sampled) for x in (maneuver.outputs, y)
+        )
+        errors.append((measured - modelled) * seen)
+        mean = np.sum(measured * seen, axis=0) / np.maximum(np.sum(seen, axis=0), 1)
+        motions.append((measured - mean) * seen)
+    spread = np.sqrt(np.mean(np.vstack(motions) ** 2, axis=0))
+    rms = np.sqrt(np.mean(np.vstack(errors) ** 2, axis=0)) / np.maximum(spread, 1e-300)
     largest = largest_rms(model, result, noise, maneuvers) / np.maximum(spread, 1e-300)
     by_gusts = bool(driven_states(model, result))
     return {
@@ -170,8 +181,7 @@ def _slopes(model: LinearModel, result: FitResult, maneuver: Maneuver) -> Array 
     free = free_responses(model, result.estimate, [maneuver])
     if free is None:
         return None
-    block = block_length(maneuver.dt_s)
-    return np.stack([block_means(J, block) for J in free.responses[0].sensitivities])
+    return slopes_of_means(free.problem, 0, free.responses[0])
 
 
 def _without_constants(errors: Array, columns: Array, power: Array) -> Array:

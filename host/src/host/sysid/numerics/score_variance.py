@@ -136,10 +136,10 @@ def variance_ratio(
     score = total.copy()
     for number, (response, m) in enumerate(zip(responses, problem.maneuvers, strict=True)):
         own, block = problem.columns(number), block_length(m.dt_s)
-        left = block_means((problem.measured(number) - response.y).T, block)
+        left = block_means(problem.residual(number, response.y).T, block, m.sampled)
         for j, (name, memory) in enumerate(zip(problem.model.outputs, noise, strict=True)):
-            scale = np.sqrt(variance[j])
-            J = memory.whiten(block_means(response.sensitivities[j], block)) / scale
+            scale, seen = np.sqrt(variance[j]), problem.seen(number, j)
+            J = memory.whiten(block_means(response.sensitivities[j], block, seen)) / scale
             information = J.T @ J
             total[np.ix_(own, own)] += information
             if name in larger:
