@@ -177,7 +177,7 @@ def test_spoilt_columns_give_the_unspoilt_estimates() -> None:
     assert min(np.mean(x) for x in true.values()) > 0.84, true
 
 
-def test_a_slow_column_leaves_the_filter_in_gusts() -> None:
+def test_a_slow_column_leaves_the_gust_filter() -> None:
     answer = host.identify(held(record(0)), models="longitudinal", stretches=[(4.0, 39.0)])
     assert answer.linear[0].method == "filter-error-gust"
     assert answer.linear[0].result.residual_kind == "innovation"

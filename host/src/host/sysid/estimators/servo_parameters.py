@@ -264,9 +264,12 @@ def _cost(found: FitResult, data: Sequence[Maneuver]) -> float:
 
     Of output error in noise with a memory, estimated beside; innovations are white.
     """
-    if found.residual_kind == "innovation" and any(m.held for m in data):
-        return float(np.asarray(found.details["cost"]))  # of as many values as were measured
     if found.residual_kind == "innovation":
+        # What was not measured has no innovation, and zeros would pass for small ones in their
+        # covariance: the filter's own cost counts what was. It has the prior in it, which those
+        # of whole data leave out.
+        if any(m.held for m in data):
+            return float(np.asarray(found.details["cost"]))
         residuals = np.concatenate(found.residuals)
         return 0.5 * len(residuals) * float(np.linalg.slogdet(np.cov(residuals.T))[1])
     motion = np.std(np.concatenate(found.residuals) + np.concatenate(found.fitted), axis=0)
