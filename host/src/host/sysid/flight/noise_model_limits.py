@@ -76,9 +76,7 @@ def excess_over_noise_model(
         squares += np.sum(errors_drawn**2, axis=1).T
         samples += len(left)
     observed, squares = observed / samples, squares / samples
-    mean, spread = np.mean(squares, axis=0), np.maximum(np.var(squares, axis=0), 1e-300)
-    shape = mean**2 / spread
-    limit = special.gammaincinv(shape, (1.0 - SIGNIFICANCE) ** (1.0 / outputs)) * mean / shape
+    mean, limit = np.mean(squares, axis=0), rarely_exceeded(squares)
     power = {
         name: float(observed[j] / mean[j])
         for j, name in enumerate(model.outputs)
@@ -91,6 +89,20 @@ def excess_over_noise_model(
     noise = [ArNoise.from_coefficient(coefficient) for coefficient, _ in fitted]
     variance = np.array([innovation / count for _, innovation in fitted])
     return NoiseExcess(power, variance_ratio(problem, responses, noise, variance, power))
+
+
+def rarely_exceeded(squares: Array) -> Array:
+    """Return the mean square that any output exceeds in 1 % of cases, (p,).
+
+    Parameters
+    ----------
+    squares : Array, shape (draws, p)
+        Mean squares as drawn: a gamma distribution goes through them.
+    """
+    mean, spread = np.mean(squares, axis=0), np.maximum(np.var(squares, axis=0), 1e-300)
+    shape = mean**2 / spread
+    level = (1.0 - SIGNIFICANCE) ** (1.0 / len(mean))
+    return np.asarray(special.gammaincinv(shape, level) * mean / shape)
 
 
 def random_errors(
@@ -130,8 +142,7 @@ def random_errors(
     steady = steady_covariance(A[np.ix_(air, air)], intensity[air])
     x[air] = _root(steady) @ rng.standard_normal((len(air), DRAWS))
     means = maneuver.samples // block
-    share = np.mean(maneuver.sampled, axis=0) if maneuver.sampled is not None else np.ones(len(C))
-    counted = np.maximum(block * share, 1.0)
+    counted = np.maximum(block * np.mean(maneuver.seen, axis=0), 1.0)
     deviation = np.asarray(result.details["noise_deviation"]) / np.sqrt(counted)
     errors = rng.standard_normal((len(C), means, DRAWS)) * deviation[:, None, None]
     for k in range(means):
@@ -142,11 +153,8 @@ def random_errors(
 
 def measured_means(maneuver: Maneuver, block: int) -> BoolArray:
     """Return of which means over `block` samples anything was measured, (means, p)."""
-    seen = maneuver.sampled
-    if seen is None:
-        return np.ones((maneuver.samples // block, maneuver.outputs.shape[1]), dtype=bool)
-    whole = seen[: len(seen) // block * block].reshape(-1, block, seen.shape[1])
-    return np.asarray(whole.any(axis=1))
+    means = maneuver.samples // block
+    return np.asarray(maneuver.seen[: means * block].reshape(means, block, -1).any(axis=1))
 
 
 def slopes_of_means(problem: OutputProblem, number: int, response: Response) -> Array:

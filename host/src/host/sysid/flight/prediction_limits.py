@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
 
 from host.arrays import Array
 from host.sysid.estimators.innovations import PROCESS
@@ -23,6 +22,7 @@ from host.sysid.flight.noise_model_limits import (
     DRAWS,
     measured_means,
     random_errors,
+    rarely_exceeded,
     slopes_of_means,
 )
 from host.sysid.models.fit_result import FitResult
@@ -31,7 +31,6 @@ from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.ar_noise import ArNoise, autocovariance
 from host.sysid.numerics.input_coherence import InputCoherence, block_length, block_means
 
-SIGNIFICANCE = 0.01
 DRAW_SEED = 1
 LONGEST_LAG = 200  # of an autocorrelation that counts, means
 SETTLING = 200  # means before a drawn AR series counts
@@ -148,11 +147,7 @@ def largest_rms(
         left = _without_constants(errors, slopes[:, :, count:], np.mean(errors**2, axis=(1, 2)))
         squares += np.sum(left**2, axis=1).T
         samples += means
-    squares /= samples
-    mean, spread = np.mean(squares, axis=0), np.var(squares, axis=0)
-    shape = mean**2 / np.maximum(spread, 1e-300)
-    level = (1.0 - SIGNIFICANCE) ** (1.0 / outputs)
-    return np.asarray(np.sqrt(special.gammaincinv(shape, level) * mean / shape))
+    return np.asarray(np.sqrt(rarely_exceeded(squares / samples)))
 
 
 def power_freedom(memory: ArNoise, samples: int) -> float:
