@@ -187,9 +187,6 @@ def _passed(
     given = problem.given(number, problem.first_guess())
     n = len(model.states)
     no_limit = np.full(n, np.inf)
-    seen = np.ones(maneuver.outputs.shape, dtype=bool)
-    if maneuver.held and maneuver.sampled is not None:
-        seen = np.ascontiguousarray(maneuver.sampled)
     late = [int(k) for k in layout.delay]
     leader = np.array([late.index(k) for k in late], dtype=np.int64)
     e, white, power = (np.empty(maneuver.outputs.shape) for _ in range(3))
@@ -198,10 +195,10 @@ def _passed(
     )
     if not finite(
         model.source.code.loop(filter_equations), z, P, lower, upper, intensity, variance,
-        given.inputs, maneuver.outputs, seen, given.parameters, layout.column, problem.constants,
-        problem.tables, np.zeros(n), layout.bias, np.zeros(len(late)), layout.offset,
-        np.zeros(len(late)), layout.delay, leader, layout.input_delay, maneuver.dt_s,
-        problem.substeps, problem.ramp, e, white, power,
+        given.inputs, maneuver.outputs, maneuver.seen, given.parameters, layout.column,
+        problem.constants, problem.tables, np.zeros(n), layout.bias, np.zeros(len(late)),
+        layout.offset, np.zeros(len(late)), layout.delay, leader, layout.input_delay,
+        maneuver.dt_s, problem.substeps, problem.ramp, e, white, power,
     ) or not np.isfinite(z).all():  # fmt: skip
         raise IdentificationError(
             f"{maneuver.name}: the Kalman filter diverged; give better start values"

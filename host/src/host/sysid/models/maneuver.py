@@ -107,6 +107,12 @@ class Maneuver:
         return self.sampled is not None
 
     @property
+    def seen(self) -> BoolArray:
+        """At which samples each output was measured, (samples, n_outputs)."""
+        whole = np.ones(self.outputs.shape, dtype=bool)
+        return whole if self.sampled is None else np.ascontiguousarray(self.sampled)
+
+    @property
     def time_s(self) -> Array:
         """Time from the first sample, s."""
         return np.arange(self.samples) * self.dt_s

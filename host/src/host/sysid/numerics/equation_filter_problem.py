@@ -189,15 +189,12 @@ class EquationFilterProblem:
             return None
         inputs = g.inputs.shape[1]
         none = np.full(max(n, outputs, inputs), -1, dtype=np.int64)
-        seen = np.ones(maneuver.outputs.shape, dtype=bool)
-        if maneuver.sampled is not None:
-            seen = np.ascontiguousarray(maneuver.sampled)
         e, white, power = (np.empty(maneuver.outputs.shape) for _ in range(3))
         delay_s = np.array([0.0 if k < 0 else theta[k] for k in self._late])
         no_limit = np.full(n, np.inf)
         if not finite(
             self._run, g.start.copy(), self._first_covariance(g, intensity), -no_limit, no_limit,
-            intensity, variance, g.inputs, maneuver.outputs, seen, g.parameters,
+            intensity, variance, g.inputs, maneuver.outputs, maneuver.seen, g.parameters,
             np.full(len(g.parameters), -1, dtype=np.int64), problem.constants, problem.tables,
             g.bias, none[:n], problem.output_offsets(g.local), none[:outputs], delay_s,
             none[:outputs], self._leader, none[:inputs], maneuver.dt_s,

@@ -141,8 +141,7 @@ def filter_intermittent(
         Its outputs, and at which samples each was measured.
     """
     q, measured = equations, maneuver.outputs
-    size, seen = measured.shape, maneuver.sampled
-    sampled = np.ones(size, dtype=bool) if seen is None else seen
+    size = measured.shape
     found = IntermittentInnovations(
         e=np.zeros(size),
         independent=np.zeros(size),
@@ -153,7 +152,7 @@ def filter_intermittent(
     done = _filter(
         q.step, q.by_step, q.read, q.by_read, q.Q, q.Q_slopes, q.variance, q.start.copy(),
         q.by_start.copy(), q.P.copy(), q.P_slopes.copy(), drive, measured,
-        np.ascontiguousarray(sampled), found.e, found.independent, found.variance,
+        maneuver.seen, found.e, found.independent, found.variance,
         found.by_independent, found.by_variance,
     )  # fmt: skip
     return found if done and np.isfinite(found.cost) else None
@@ -175,7 +174,7 @@ def no_clock(model: LinearModel, maneuvers: Sequence[Maneuver]) -> str:
     With every column held for five rows, in gusts, the IMU seemed up to 2 ms late and M_q of four
     flights was 2 to 10 % small; in calm air M_alpha was 2.6 standard errors off in two of three.
     """
-    quick = all(m.sampled is None or m.sampled.all(axis=0).any() for m in maneuvers)
+    quick = all(m.seen.all(axis=0).any() for m in maneuvers)
     return "" if quick or not model.delays else "no column is quick enough to tell the delays"
 
 
@@ -328,8 +327,10 @@ def state_ahead(x: Array, by_x: Array, step: Array, by_step: Array, z: Array, T:
 def output_at(
     x: Array, by_x: Array, drive: Array, h: Array, by_h: Array, by_innovation: Array
 ) -> float:
-    """Return an output by its row `h` (n + w,) of state and drive, whose slopes `by_h` (n + w, L)
-    are; what it moves with the unknowns is taken off `by_innovation` (L,)."""
+    """Return an output; its slopes are taken off those of its innovation, `by_innovation` (L,).
+
+    `h` (n + w,) and `by_h` (n + w, L) are its rows by state and drive.
+    """
     n, total, y = len(x), len(by_innovation), 0.0
     for c in range(len(h)):
         value = x[c] if c < n else drive[c - n]
@@ -383,8 +384,8 @@ def _filter(
         for j in range(p):
             if not sampled[k, j]:
                 continue
-            left, by_left = measured[k, j], by_independent[k, j]
-            left -= output_at(x, by_x, z[n:], read[j], by_read[j], by_left)
+            by_left = by_independent[k, j]
+            left = measured[k, j] - output_at(x, by_x, z[n:], read[j], by_read[j], by_left)
             independent[k, j] = left
             spread[k, j] = take_output(
                 x, by_x, P, P_slopes, read[j, :n], by_read[j, :n], left, by_left, variance[j],
