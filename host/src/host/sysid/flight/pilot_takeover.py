@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from host.arrays import Array
+from host.sysid.flight.feedback_findings import STILL_RAD
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.numerics.state_feedback import feedback_law
 
@@ -22,7 +23,6 @@ LEVELLING = {
 }
 # After the jump with which he takes over, until he may leave the sticks again.
 FOLLOWS_S = (0.1, 1.5)
-STILL_RAD = 1e-3  # a surface that moves less moves nothing
 
 
 def taken_over(
