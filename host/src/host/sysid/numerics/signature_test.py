@@ -94,9 +94,9 @@ def signature_test(
     if not free.any():
         return SignatureTest("", 1.0, 1.0, (), np.zeros(len(score)))
     inner, raw = inner[np.ix_(free, free)], (right - link.T @ score)[free]
-    told = [[w[:, free] for w in own] for own in reduced]
+    testable = [[w[:, free] for w in own] for own in reduced]
     size = identified_inverse(inner) @ raw
-    covariance = _score_covariance(data, told, inner, size, inverse @ score)
+    covariance = _score_covariance(data, testable, inner, size, inverse @ score)
     deviation = np.sqrt(np.maximum(np.diag(covariance), LEAST * np.diag(inner)))
     scores = raw / deviation
     values, vectors = np.linalg.eigh(covariance / np.outer(deviation, deviation))
