@@ -134,16 +134,20 @@ def correct_columns(
 def _correct_pitot(
     columns: Mapping[str, Array], errors: Mapping[str, float], part: float
 ) -> dict[str, Array]:
-    scale, zero, dense = (errors.get(name, 0.0) for name in (*PITOT, DENSITY))
+    scale, zero, density_error = (errors.get(name, 0.0) for name in (*PITOT, DENSITY))
     density = columns.get("density_kgpm3", np.array(1.225))
     corrected = {}
     if AIR[0] in columns:
         square = columns[AIR[0]] ** 2 - 2.0 * zero / density
         corrected[AIR[0]] = np.sqrt(np.maximum(square, 0.0) / (1.0 + scale))
     if "qbar_pa" in columns:
-        corrected["qbar_pa"] = (columns["qbar_pa"] - zero) / (1.0 + part * scale) / (1.0 + dense)
+        corrected["qbar_pa"] = (
+            (columns["qbar_pa"] - zero) / (1.0 + part * scale) / (1.0 + density_error)
+        )
     if "density_kgpm3" in columns:
-        corrected["density_kgpm3"] = density * (1.0 + scale) / (1.0 + part * scale) / (1.0 + dense)
+        corrected["density_kgpm3"] = (
+            density * (1.0 + scale) / (1.0 + part * scale) / (1.0 + density_error)
+        )
     return corrected
 
 

@@ -24,7 +24,7 @@ from host.sysid.numerics.filter_scoring import (
 )
 from host.sysid.numerics.gauss_newton import GaussNewtonResult, damped_step, gauss_newton
 from host.sysid.numerics.information_inverse import covariance_from_information
-from host.sysid.numerics.intermittent_filter import too_slow
+from host.sysid.numerics.intermittent_filter import needs_compiler
 from host.sysid.numerics.maneuver_agreement import maneuver_influence
 from host.sysid.numerics.output_error import minimise
 from host.sysid.numerics.restricted_likelihood import half_log_determinants, restricted_slopes
@@ -76,7 +76,7 @@ def fit_filter_error(
     IdentificationError
         If no start is finite, or there is no compiler for so many samples with missing outputs.
     """
-    slow = too_slow(maneuvers)
+    slow = needs_compiler(maneuvers)
     if slow:
         raise IdentificationError(slow)
     if process is None:

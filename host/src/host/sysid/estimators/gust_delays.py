@@ -140,8 +140,10 @@ def advance_outputs(
 
 
 def _moved(maneuver: Maneuver, shifts_s: Array) -> Maneuver:
-    """Return the maneuver with each output earlier by a time, (p,) s; what was measured moves along
-    to the nearest sample."""
+    """Return the maneuver with each output earlier by a time, (p,) s.
+
+    At which samples it was measured moves along, to the nearest one.
+    """
     t, rows = maneuver.time_s, np.arange(maneuver.samples)
     columns = [np.interp(t + s, t, y) for s, y in zip(shifts_s, maneuver.outputs.T, strict=True)]
     if maneuver.sampled is None:

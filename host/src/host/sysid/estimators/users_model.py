@@ -25,7 +25,7 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver, measurements
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.intermittent_filter import no_clock, too_slow
+from host.sysid.numerics.intermittent_filter import needs_compiler, unidentifiable_delays
 
 GUST, FILTER = "filter-error-gust", "filter-error"
 MEMORY, WHITE = "output-error", "output-error-white"
@@ -142,7 +142,7 @@ def fit_by_evidence(
 
 def no_filter(model: LinearModel, maneuvers: Sequence[Maneuver]) -> str:
     """Return why no Kalman filter fits this model to these data; empty where one does."""
-    why = too_slow(maneuvers) or no_clock(model, maneuvers)
+    why = needs_compiler(maneuvers) or unidentifiable_delays(model, maneuvers)
     if why:
         return why
     if model.known_noise:

@@ -33,7 +33,7 @@ from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
 from host.sysid.numerics.maneuver_agreement import inflate_covariance, maneuver_agreement
 from host.sysid.numerics.score_variance import white_fit_variance
 
-ENOUGH = 0.25  # of all samples, in maneuvers that a test input made
+LEAST_COMMANDED = 0.25  # of all samples, in maneuvers that a test input made
 WHITE = "output error (white)"  # its noise is judged beside what the inputs drive
 
 
@@ -109,12 +109,11 @@ def _of_noise(e: LinearEstimate) -> tuple[FitResult, InputCoherence | None]:
 def _coherence(
     e: LinearEstimate, free: FreeResponses, at_trim: Sequence[Maneuver]
 ) -> InputCoherence:
-    """Return what the inputs drive beside the model; what test inputs alone show, where that is
-    nothing.
+    """Return what the inputs drive beside the model.
 
-    What gusts leave looks driven by a pilot who takes over (`pilot_takeover`): a lag of the aileron
-    of -3.2 deviations in the mean of 12 right fits in air that rolls, -0.3 in test inputs alone. A
-    suspicion that these do not share is dropped, if there is enough of them to suspect anything.
+    A suspicion is dropped where test inputs alone arouse none, and there are enough of them. A
+    pilot who takes over (`pilot_takeover`) seems to drive what gusts leave: a lag of the aileron
+    was -3.2 deviations in the mean of 12 right fits in air that rolls, -0.3 in test inputs alone.
     """
     found = input_coherence(free.problem, free.responses, free.theta)
     if not found.suspected:
@@ -126,7 +125,7 @@ def _coherence(
         if not taken_over(columns, flown.found, surfaces)
     ]
     samples, every = (sum(m.samples for m in some) for some in (commanded, at_trim))
-    if samples < ENOUGH * every or len(commanded) == len(at_trim):
+    if samples < LEAST_COMMANDED * every or len(commanded) == len(at_trim):
         return found
     again = free_responses(e.model, e.estimate, commanded)
     if again is None:

@@ -158,7 +158,7 @@ def filter_intermittent(
     return found if done and np.isfinite(found.cost) else None
 
 
-def too_slow(maneuvers: Sequence[Maneuver]) -> str:
+def needs_compiler(maneuvers: Sequence[Maneuver]) -> str:
     """Return why such a filter takes hours over these maneuvers; empty where it does not."""
     samples = sum(m.samples for m in maneuvers if m.held)
     if has_compiler() or samples <= SAMPLES_WITHOUT_COMPILER:
@@ -168,7 +168,7 @@ def too_slow(maneuvers: Sequence[Maneuver]) -> str:
     )
 
 
-def no_clock(model: LinearModel, maneuvers: Sequence[Maneuver]) -> str:
+def unidentifiable_delays(model: LinearModel, maneuvers: Sequence[Maneuver]) -> str:
     """Return why such a filter cannot tell the delays of a model; empty where it can.
 
     With every column held for five rows, in gusts, the IMU seemed up to 2 ms late and M_q of four
