@@ -193,6 +193,52 @@ def test_a_late_servo_is_found_by_the_extended_filter_as_by_output_error(late_s:
     assert half_width_s == pytest.approx(peer.half_width()[peer.index("servo_s")], rel=0.3)
 
 
+@pytest.mark.parametrize("prior_sd", [0.1, 0.2, 1.0])
+@pytest.mark.parametrize("kind", ["equations", "linear"])
+def test_a_prior_counts_once_as_bayes_rule_says(prior_sd: float, kind: str) -> None:
+    """A second pass took its own start for the prior's mean: at 0.1 the answer was 8 deviations
+    off. Linear models had no prior at all."""
+    data, noise_sd = rolled(moved=0.0), 0.02
+    parameter = {"L_da": {"start": 36.0, "prior_sd": prior_sd}}
+    model = (
+        equations(rates={"p_radps": "-5.0*p_radps + L_da*aileron_rad"}, parameters=parameter)
+        if kind == "equations"
+        else model_from({**LINEAR_ROLL, "A": [[-5.0]], "parameters": parameter})
+    )
+    found = fit("extended-kalman", model, [data], noise=np.array([noise_sd]), process=np.zeros(1))
+    # Linear in the roll rate at the start and in L_da, so the answer is known.
+    ahead = linalg.expm(DT_S * np.array([[-5.0, 1.0, 0.0], [0.0, 0.0, 1.0 / DT_S], [0.0] * 3]))[0]
+    u, y = data.inputs[:, 0], data.outputs[:, 0]
+    slopes = np.zeros((SAMPLES, 2))
+    slopes[0, 0] = 1.0
+    for k in range(SAMPLES - 1):
+        slopes[k + 1] = ahead[0] * slopes[k]
+        slopes[k + 1, 1] += ahead[1] * u[k] + ahead[2] * (u[k + 1] - u[k])
+    known = np.array([3.0 * noise_sd, prior_sd]) ** -2.0
+    information = slopes.T @ slopes / noise_sd**2 + np.diag(known)
+    score = slopes.T @ y / noise_sd**2 + known * np.array([y[0], 36.0])
+    sd = np.sqrt(np.linalg.inv(information)[1, 1])
+    exact = np.linalg.solve(information, score)[1]
+    assert found.value("L_da") == pytest.approx(exact, abs=0.01 * sd)
+    assert np.sqrt(found.covariance_white[0, 0]) == pytest.approx(sd, rel=0.01)
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.03])
+def test_a_late_output_sees_its_inputs_later_too(late_s: float) -> None:
+    """An accelerometer that the surface drives at once: its delay was 144 and 68 ms off."""
+    outputs = {"p_radps": "p_radps", "p_dot_radps2": "L_p*p_radps + L_da*aileron_rad"}
+    delays = [{"name": "late_s", "outputs": ["p_dot_radps2"], "prior_sd_s": 0.05, "limit_s": 0.2}]
+    data = served(0.0)
+    y = np.stack([data.outputs[:, 0], served(late_s).outputs[:, 1]], axis=1)
+    data, model = Maneuver(DT_S, data.inputs, y), equations(outputs=outputs, delays=delays)
+    found, peer = (fit(name, model, [data]) for name in ("extended-kalman", "output-error-white"))
+    half_width_s = peer.half_width()[peer.index("late_s")]
+    assert half_width_s < 0.003
+    assert abs(found.value("late_s") - peer.value("late_s")) < half_width_s
+    assert abs(found.value("late_s") - late_s) < 2.0 * half_width_s
+    assert found.half_width()[found.index("late_s")] < 1.5 * half_width_s
+
+
 def test_filter_error_takes_delays_of_outputs_and_inputs() -> None:
     """The gyro or the servo two samples late: the filter's own delays, no data are shifted."""
     data = rolled(late=2, moved=0.0)

@@ -79,7 +79,7 @@ def fit_unscented(
     noise : Array, optional
         Standard deviation of each output, shape (p,); by default from third differences.
     start : Array, optional
-        Common parameters; by default from equation error.
+        Common parameters; by default the mean of a prior, else from equation error.
     """
     return _run(model, maneuvers, process, noise, start, unscented=True)
 
@@ -89,6 +89,25 @@ def noise_deviation(maneuvers: Sequence[Maneuver]) -> Array:
     stacked = np.vstack([np.diff(m.outputs, n=3, axis=0) for m in maneuvers])
     floor = 1e-6 * np.max(np.abs(np.vstack([m.outputs for m in maneuvers])), axis=0) + 1e-12
     return np.asarray(np.maximum(np.sqrt(np.mean(stacked**2, axis=0) / 20.0), floor))
+
+
+def change_by_priors(model: LinearModel, covariance: Array, began: Array) -> Array:
+    """Return what an estimate moves by, so that priors count once, about their own means.
+
+    A pass takes where it starts for the mean. Moved by P P0^-1 (mean - start) the answer is exact
+    where the model is linear, and stays linearised about the pass before.
+
+    Parameters
+    ----------
+    model : LinearModel
+    covariance : Array, shape (P, k)
+        Behind the pass, of all unknowns by the k parameters and delays of the model.
+    began : Array, shape (k,)
+        Where the pass started.
+    """
+    mean = np.append(model.start, np.zeros(len(model.delays)))
+    sd = [*(p.prior_sd for p in model.parameters), *(d.prior_sd_s for d in model.delays)]
+    return np.asarray(covariance @ (np.array(sd) ** -2.0 * (mean - began)))
 
 
 def innovation_inflation(white: Sequence[Array]) -> float:
@@ -160,12 +179,17 @@ def _run(
     size = n + len(names)
     joint: Array = np.zeros(size)
     P: Array = np.zeros((size, size))
-    joint[n : n + q] = first
     spread_first = INITIAL_RELATIVE_SD * np.abs(first) + 1e-3 * np.max(np.abs(first))
+    for k, parameter in enumerate(model.parameters):
+        if np.isfinite(parameter.prior_sd):
+            spread_first[k] = parameter.prior_sd
+            first[k] = parameter.start if start is None else first[k]
+    joint[n : n + q] = began = first
     residuals: list[Array] = []
     white: list[Array] = []
     for _ in range(PASSES):
         # Each pass starts with the first covariance: data must not be counted twice.
+        began = joint[n : n + q].copy()
         P[:] = 0.0
         P[n : n + q, n : n + q] = np.diag(spread_first**2)
         residuals, white = [], []
@@ -190,7 +214,7 @@ def _run(
             white.append(whitened)
     return filter_result(
         "unscented Kalman filter" if unscented else "extended Kalman filter",
-        (model, names, joint[n:], P[n:, n:]),
+        (model, names, joint[n:] + change_by_priors(model, P[n:, n : n + q], began), P[n:, n:]),
         maneuvers,
         (residuals, white),
         {"noise_deviation": deviation, "process": intensity},

@@ -12,6 +12,7 @@ from host.sysid.estimators.kalman import (
     INITIAL_RELATIVE_SD,
     PASSES,
     PROCESS_SHARE,
+    change_by_priors,
     filter_result,
     noise_deviation,
 )
@@ -36,8 +37,8 @@ def fit_extended_equations(
 
     Common parameters and delays go on from maneuver to maneuver, what belongs to a record starts
     anew in each. A late input is read anew at every sample, as late as is known by then. First
-    deviations are those of the priors, else half of a start value; bounds hold at every sample
-    (Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 7).
+    deviations are those of the priors, which count once, else half of a start value; bounds hold at
+    every sample (Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 7).
 
     Parameters
     ----------
@@ -67,12 +68,12 @@ def fit_extended_equations(
         ]
     )
     intensity = (PROCESS_SHARE * spread if process is None else np.asarray(process)) ** 2
-    shared, known = guess[:common], np.diag(layout.sd[:common] ** 2)
+    shared = began = guess[:common]
     residuals: list[Array] = []
     white: list[Array] = []
     z, P = np.zeros(0), np.zeros((0, 0))
     for _ in range(PASSES):
-        known = np.diag(layout.sd[:common] ** 2)  # data must not be counted twice
+        began, known = shared, np.diag(layout.sd[:common] ** 2)  # data must not be counted twice
         residuals, white = [], []
         for number in range(len(maneuvers)):
             z = np.concatenate([np.zeros(n), shared, layout.start[common:]])
@@ -93,11 +94,13 @@ def fit_extended_equations(
             shared, known = z[n : n + common], P[n : n + common, n : n + common].copy()
             residuals.append(e)
             white.append(unit)
+    estimate = z[n:] + change_by_priors(model, P[n:, n : n + common], began)
+    estimate = np.clip(estimate, layout.lower, layout.upper)
     theta = guess.copy()
-    theta[:common] = shared
+    theta[:common] = estimate[:common]
     return filter_result(
         "extended Kalman filter",
-        (problem.model_at(theta), layout.names, z[n:], P[n:, n:]),
+        (problem.model_at(theta), layout.names, estimate, P[n:, n:]),
         maneuvers,
         (residuals, white),
         {"noise_deviation": deviation, "process": np.sqrt(intensity)},
