@@ -67,6 +67,31 @@ def input_within(
         by_shift[j] = slope + ramp * share * (slope_there - slope)
 
 
+@compiled_part
+def input_rate(
+    inputs: Array,
+    position: float,
+    shift: Array,
+    input_column: IntArray,
+    ramp: float,
+    rate: Array,
+    begin: Array,
+    unused: Array,
+) -> None:
+    """Write into `rate` (m,) how fast the inputs move before a time, in samples, per sample.
+
+    `begin` and `unused` (m,) are work, all else as of `input_at`.
+    """
+    k = int(np.ceil(position)) - 1
+    if k < 0 or k >= len(inputs) - 1:
+        rate[:] = 0.0
+        return
+    input_within(inputs, k, 0.0, shift, input_column, ramp, begin, unused)
+    input_within(inputs, k, 1.0, shift, input_column, ramp, rate, unused)
+    for j in range(inputs.shape[1]):
+        rate[j] -= begin[j]
+
+
 @of_equations
 def step_along(
     x: Array,
@@ -335,6 +360,14 @@ def filter_equations(
             input_at(inputs, k - late / dt_s, shift, input_column, ramp, u[2], by_shift[2])
             reading_slopes(back, u[2], p, c, t, y, yx, yu, yp)
             multiply(yx, S, reached)
+            if delay_column[j] >= 0:
+                # An output that an input drives at once sees that input later too.
+                input_rate(
+                    inputs, k - late / dt_s, shift, input_column, ramp, u[0], u[1], by_shift[0]
+                )
+                for i in range(outputs):
+                    for b in range(m):
+                        reached[i, delay_column[j]] -= yu[i, b] * u[0, b] / dt_s
             for i in range(outputs):
                 if leader[i] != j:
                     continue
