@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import threading
+import time
 from pathlib import Path
 from types import ModuleType
 
@@ -42,6 +44,23 @@ def test_blank_chip_stays_in_the_bootloader(build: ModuleType) -> None:
         chip.run_s(3.0)
         assert chip.pc >= 0x3E000
         assert chip.flash(0, 256) == b"\xff" * 256
+
+
+def test_chip_waits_for_a_program_that_stands_still() -> None:
+    with bootloader_chip() as chip:
+        chip.power_on()
+        chip.run_s(0.1)
+        with PtyBridge(chip, 0, reset_on_open=True) as bridge:
+            terminal = os.open(bridge.path, os.O_RDWR | os.O_NOCTTY)
+            began_s, from_s = time.monotonic(), chip.time_s
+            try:
+                bridge.serve(lambda: time.monotonic() - began_s > 1.0)
+            finally:
+                os.close(terminal)
+            waited_s = time.monotonic() - began_s
+        started_s = 0.1  # after the reset of an opened terminal
+        passed_s = chip.time_s - from_s - started_s
+        assert passed_s <= bridge.BUSY_S + bridge.WAITING * waited_s + 2.0 * bridge.SLICE_S
 
 
 @pytest.mark.parametrize("program", ["everything"])

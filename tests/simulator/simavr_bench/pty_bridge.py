@@ -30,7 +30,8 @@ class PtyBridge:
         What the program outside speaks; a pseudo-terminal does not tell.
     reset_on_open : bool
         Reset the chip when a program opens the terminal, in place of the DTR line that it lacks,
-        and let the chip wait for that program: `WAITING` of its time passes while no byte flows.
+        and let the chip wait for that program: while no byte flows, `BUSY_S` pass for what it does
+        with the last ones, and then `WAITING` of the time on the wall.
 
     Attributes
     ----------
@@ -40,6 +41,7 @@ class PtyBridge:
 
     SLICE_S = 0.001
     WAITING = 0.1
+    BUSY_S = 0.1
 
     def __init__(
         self, chip: Chip, port: int = 0, *, baud: float = 115200.0, reset_on_open: bool = False
@@ -115,17 +117,17 @@ class PtyBridge:
             If ``done()`` stays false.
         """
         began_s, from_s = time.monotonic(), self._chip.time_s
-        pace = self.WAITING if self._reset else 1.0
+        pace, busy_s = (self.WAITING, self.BUSY_S) if self._reset else (1.0, 0.0)
         while not done():
             flowing = self._exchange() or bool(self._out)
-            self._chip.run_s(self.SLICE_S)
             waited_s = time.monotonic() - began_s
             if waited_s > limit_s:
                 raise TimeoutError(f"nothing came of it in {limit_s} s")
             passed_s = pace * waited_s
-            ahead_s = self._chip.time_s - from_s - passed_s
             if flowing:
                 from_s = self._chip.time_s - passed_s  # time spent in bytes is no lead
-            elif ahead_s > 0:
-                time.sleep(min(ahead_s, 0.002))
+            elif self._chip.time_s - from_s > passed_s + busy_s:
+                time.sleep(self.SLICE_S)
+                continue
+            self._chip.run_s(self.SLICE_S)
         self._exchange()
