@@ -50,6 +50,7 @@ def _slow_outputs(flight: AutopilotFlight) -> list[Finding]:
             tuple(f"{name}_rad" for name in slow),
             f"outputs are logged more slowly than servos get them ({rates}): when a surface moved"
             " is known to a part of a step only",
+            ("a logging profile that writes outputs rarely", "a log received by radio"),
             done="what lies between two records is drawn on a curve through four",
         )
     ]

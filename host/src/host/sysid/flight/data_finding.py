@@ -1,7 +1,8 @@
 """A finding: what a check of the data found, what may have caused it, what was done about it.
 
 A finding ends no work; only what cannot be fitted does. Each check has a short, stable name, which
-`--accept` takes: the column is then used as it is.
+`--accept` takes: the column is then used as it is. A finding that changed no column has nothing to
+override, and its line says so.
 
 How a verdict reads findings: `open_channels` names the columns of ours that are in doubt. What an
 answer takes from one of them is never under "trust": the derivatives in the equation of such a
@@ -13,7 +14,7 @@ is set only where the samples themselves are in no fit.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -120,8 +121,9 @@ class Finding:
         return f"{where}finding {self.check}: {self.text}{causes}; {self.done}"
 
     def accept(self) -> Finding:
-        """Return the finding as the user accepted it: where columns are in doubt they are used."""
-        done = AS_IT_IS if self.channels or self.feedback else self.done
+        """Return the finding as the user accepted it: what it left out is used as it is."""
+        used = self.closed or self.done == AS_IT_IS
+        done = AS_IT_IS if used else f"which overrides nothing: {self.done}"
         return replace(self, accepted=True, closed=False, done=f"accepted, {done}")
 
 
@@ -144,6 +146,16 @@ def finding_document(finding: Finding) -> dict[str, Any]:
         "flight": finding.flight or None,
         "feedback": asdict(finding.feedback) if finding.feedback else None,
     }
+
+
+def accepted_in_vain(accept: Collection[str], findings: Sequence[Finding]) -> list[str]:
+    """Return a note on each accepted check that found nothing."""
+    found = {f.check for f in findings}
+    return [
+        f"accepted check {name} found nothing in these data"
+        for name in CHECKS
+        if name in accept and name not in found
+    ]
 
 
 def accepted_checks(given: Sequence[str]) -> frozenset[str]:

@@ -33,14 +33,15 @@ def checked(
     columns : mapping
         SI columns on an even grid.
     accept : collection of str
-        Checks whose findings change nothing.
+        Checks whose findings change nothing; no other finding changes a column of theirs either.
     """
     result, settled = dict(columns), []
     findings = check(result)
     accepted = [f.accept() for f in findings if f.check in accept]
+    kept = {name for f in accepted for name in f.channels}
     for _ in range(MOST_READINGS):
         asked = [f for f in findings if f.check not in accept]
-        if not (found := reread(result, asked)):
+        if not (found := reread(result, asked, kept)):
             break
         reading, left = found
         result = reading.read(result)
@@ -60,7 +61,7 @@ def checked(
         if f.check in accept:
             continue
         out = LEFT_OUT.get(f.check)
-        if out in result:
+        if out in result and out not in kept:
             del result[out]
             settled.append(replace(f, done=f"{out} left out"))
         else:

@@ -60,6 +60,7 @@ def no_instrument_errors_finding(columns: Collection[str]) -> Finding:
         tuple(name for name in names if name in columns),
         "without vanes the flight path is not reconstructed, and what sensors and servos may be"
         " wrong by is in no interval",
+        ("a log without GPS velocity or airspeed", "too short a flight"),
         done="intervals count noise, gusts and the model's lack only",
     )
 
@@ -75,6 +76,7 @@ def no_vanes_finding(columns: Collection[str], *, reconstructed: bool = False) -
             "flow-angles",
             () if reconstructed else missing,
             f"no vane measured {' and '.join(WORDS[y] for y in missing)}",
+            ("an aircraft without vanes", "a column under another name"),
             done="told by rates and accelerations where that can be, else refused"
             + ("; errors of IMU, places and servos are in the intervals" if reconstructed else ""),
         )

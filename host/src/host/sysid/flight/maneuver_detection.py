@@ -18,6 +18,7 @@ from host.arrays import Array, BoolArray, IntArray
 from host.sysid.flight.free_response import with_free_response
 from host.sysid.flight.logged_inputs import logged_inputs
 from host.sysid.flight.sustained_inputs import sustained_inputs
+from host.sysid.flight.unit_sign_checks import THROTTLE
 
 LAG_S = 0.12  # a hand needs about this long for one edge
 LEAST_EDGE_RAD = 0.025  # 1.4 degrees: a pulse smaller than this excites nothing on a trainer
@@ -80,7 +81,7 @@ def detect_maneuvers(columns: Mapping[str, Array]) -> list[DetectedManeuver]:
     t = np.asarray(columns["t_s"], dtype=np.float64)
     flying = np.ones(len(t), dtype=bool)
     if "airspeed_mps" in columns:
-        speed = np.nan_to_num(np.asarray(columns["airspeed_mps"]))
+        speed = np.abs(np.nan_to_num(np.asarray(columns["airspeed_mps"])))
         flying = speed > FLYING_SHARE * float(np.median(speed))
     found: list[DetectedManeuver] = []
     for record in _records(t, columns):
@@ -113,6 +114,8 @@ def _of_record(columns: Mapping[str, Array], flying: BoolArray) -> list[Detected
         for axis in AXES
         if axis in columns
     }
+    if "throttle" in surfaces:
+        surfaces["throttle"] = _share_of_full(surfaces["throttle"])
     found: list[DetectedManeuver] = []
     for axis, series in surfaces.items():
         found += _find_axis(axis, t, series, flying)
@@ -126,6 +129,13 @@ def _of_record(columns: Mapping[str, Array], flying: BoolArray) -> list[Detected
         found = [part for f in found for part in _parts(f, t, measured)]
         flying = flying & measured
     return with_free_response(found, t, surfaces, flying)
+
+
+def _share_of_full(throttle: Array) -> Array:
+    """Return throttle as a share of its largest value where it is no share of full: in per cent
+    its least motion would hide the surfaces."""
+    largest = float(np.max(np.abs(throttle)))
+    return throttle / largest if largest > THROTTLE[1] else throttle
 
 
 def _parts(item: DetectedManeuver, t: Array, measured: BoolArray) -> list[DetectedManeuver]:

@@ -26,7 +26,7 @@ def whole_flight(columns: Mapping[str, Array]) -> tuple[list[DetectedManeuver], 
     t = columns["t_s"]
     flown = np.ones(len(t), dtype=bool)
     if "airspeed_mps" in columns:
-        speed = columns["airspeed_mps"]
+        speed = np.abs(columns["airspeed_mps"])
         flown = speed > FLYING_SHARE * float(np.median(speed))
     swing = {s: float(np.ptp(columns[s][flown])) for s in SURFACES if s in columns and flown.any()}
     if flown.sum() < FEWEST or max(swing.values(), default=0.0) < STILL_RAD:

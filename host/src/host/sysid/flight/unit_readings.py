@@ -9,7 +9,7 @@ columns had must still be seen.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,7 +47,7 @@ class Reading:
 
 
 def reread(
-    columns: Mapping[str, Array], findings: Sequence[Finding]
+    columns: Mapping[str, Array], findings: Sequence[Finding], kept: Collection[str] = ()
 ) -> tuple[Reading, list[Finding]] | None:
     """Return the reading that settles most findings, and what is found then; None if none does.
 
@@ -57,11 +57,15 @@ def reread(
         SI columns on an even grid.
     findings : sequence of Finding
         Those of `check` that ask for a reading.
+    kept : collection of str
+        Columns that are read as they are.
     """
     proven = [f for f in findings if f.wrong_unit or f.check == "gravity"]
     before, seen = check(columns), related(*airborne(columns))
     best: tuple[tuple[int, float], Reading, list[Finding]] | None = None
     for reading in _readings(columns, proven):
+        if set(reading.channels) & set(kept):
+            continue
         trial = reading.read(columns)
         after = check(trial)
         settled = {(f.check, f.channels) for f in before} - {(f.check, f.channels) for f in after}

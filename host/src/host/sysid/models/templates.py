@@ -41,7 +41,7 @@ class Trim:
     def __post_init__(self) -> None:
         if not (np.isnan(self.airspeed_mps) or 0.0 < self.airspeed_mps < np.inf):
             raise IdentificationError(
-                f"trim airspeed {self.airspeed_mps} m/s, expected a positive number"
+                f"trim airspeed {self.airspeed_mps:.4g} m/s, expected a positive number"
             )
 
     @property

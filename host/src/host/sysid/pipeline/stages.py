@@ -12,6 +12,7 @@ from host.progress import stage
 from host.sysid.answer.truth_comparison import read_truth
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, coefficient_estimator
 from host.sysid.estimators.method_options import check_options, options_of
+from host.sysid.flight.data_finding import accepted_in_vain
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import LinearEstimator
@@ -147,6 +148,7 @@ def identify(
     ]
     notes = collected_notes(ready, known.doubts if known else ())
     findings = collected_findings(ready)
+    notes += accepted_in_vain(each[0].accept, findings)
     recorded = distinct_flights([one.flight for one in ready])
     true = _truth(truth, len(recorded))
     expected = _prior(prior, recorded, known)

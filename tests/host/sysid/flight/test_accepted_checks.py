@@ -1,0 +1,173 @@
+"""`--accept CHECK`, each name: the column is used as it is, and its finding stays open."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from host.cli import main
+from host.sysid.flight.data_finding import CHECKS
+from host.sysid.flight.even_grid import USED
+from host.sysid.flight.flight_tables import read_flight_columns
+
+from tests.host.readers.autopilot_flights import write
+
+SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad")
+Change = Callable[[pd.DataFrame], pd.DataFrame]
+
+
+def times(name: str, factor: float) -> Change:
+    """A column in another unit or with the other sign."""
+    return lambda x: x.assign(**{name: factor * x[name]})
+
+
+def drifted(x: pd.DataFrame) -> pd.DataFrame:
+    """Airspeed that changes by more than the forward force makes it."""
+    more = 0.8 * 0.02 * np.cumsum(x["ax_mps2"] - x["ax_mps2"].mean())
+    return x.assign(airspeed_mps=x["airspeed_mps"] + more - more.mean())
+
+
+def stuck(x: pd.DataFrame) -> pd.DataFrame:
+    """An angle of attack that stands still through a maneuver."""
+    values = x["alpha_rad"].to_numpy(copy=True)
+    values[:400] = values[0]
+    return x.assign(alpha_rad=values)
+
+
+def climbing(x: pd.DataFrame) -> pd.DataFrame:
+    """A height that falls while the vertical speed says that it climbs."""
+    phase = x["t_s"] / 2.0
+    return x.assign(altitude_m=100.0 - 3.0 * np.sin(phase), v_down_mps=-1.5 * np.cos(phase))
+
+
+# Found in the columns: what is done about it is to read, to leave out, or nothing.
+OF_COLUMNS: dict[str, tuple[str, Change]] = {
+    "angle-size": ("alpha_rad", times("alpha_rad", 40.0)),
+    "surface-size": ("elevator_rad", times("elevator_rad", 40.0)),
+    "surface-idle": ("elevator_rad", times("elevator_rad", 1e-3)),
+    "surface-sign": ("elevator_rad", times("elevator_rad", -1.0)),
+    "gravity": ("az_mps2", times("az_mps2", -1.0)),
+    "airspeed-sign": ("airspeed_mps", times("airspeed_mps", -1.0)),
+    "static-pressure": ("static_pa", times("static_pa", 0.01)),
+    "density": ("density_kgpm3", times("density_kgpm3", 10.0)),
+    "throttle": ("throttle", times("throttle", 100.0)),
+    "airspeed-against-pressure": ("qbar_pa", times("qbar_pa", 3.0)),
+    "theta-against-q": ("theta_rad", times("theta_rad", 1.8)),
+    "phi-against-p": ("phi_rad", times("phi_rad", -1.0)),
+    "psi-against-r": ("psi_rad", times("psi_rad", -1.0)),
+    "alpha-against-q": ("alpha_rad", times("alpha_rad", 3.0)),
+    "beta-against-r": ("beta_rad", times("beta_rad", -1.0)),
+    "alpha-against-az": ("alpha_rad", times("alpha_rad", -1.0)),
+    "beta-against-ay": ("ay_mps2", times("ay_mps2", -1.0)),
+    "airspeed-against-ax": ("ax_mps2", drifted),
+    "altitude-against-climb": ("altitude_m", climbing),
+    "stuck-sensor": ("alpha_rad", stuck),
+}
+LATER = {
+    "small-inputs", "feedback", "flow-angles", "calibration", "sensor-agreement", "surface-rate",
+    "instrument-errors",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+    """A calm flight as another logger's table."""
+    folder = tmp_path_factory.mktemp("calm")
+    options = ["--seed", "19480", "--firmware", "none", "--no-picture", "-o", str(folder)]
+    assert main(["simulate", "calm", *options]) == 0
+    table = pd.read_csv(folder / "flight.csv")
+    theirs = [name for name in ("t_s", *USED) if name in table]
+    return table.loc[table["t_s"] > 8.0, theirs].reset_index(drop=True)
+
+
+def identified(path: Path, *options: str) -> dict[str, Any]:
+    """Return what a person would type, answered by a method that takes no time."""
+    arguments = ["identify", str(path), "--method", "equation-error", "--json", *options]
+    return json.loads(answered(arguments))  # type: ignore[no-any-return]
+
+
+def answered(arguments: list[str]) -> str:
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        assert main(arguments) == 0
+    return out.getvalue()
+
+
+def test_every_check_is_tried_here() -> None:
+    assert set(OF_COLUMNS) | LATER == set(CHECKS)
+    assert not set(OF_COLUMNS) & LATER
+
+
+@pytest.mark.parametrize("check", OF_COLUMNS)
+def test_an_accepted_column_is_used_as_it_is(check: str, record: pd.DataFrame) -> None:
+    name, change = OF_COLUMNS[check]
+    table = change(record)
+    [found, *_] = [f for f in read_flight_columns(table).findings if f.check == check]
+    assert name in found.channels
+    assert found.causes
+    kept = read_flight_columns(table, accept=(check,))
+    [found, *_] = [f for f in kept.findings if f.check == check]
+    assert found.done == "accepted, used as it is"
+    assert found.accepted
+    assert not found.closed
+    given = np.interp(kept.columns["t_s"], table["t_s"], table[name])
+    np.testing.assert_allclose(kept.columns[name], given, atol=1e-9 * np.abs(given).max())
+
+
+OF_TABLES: dict[str, Change] = {
+    "small-inputs": lambda x: x.assign(**{s: 0.01 * x[s] for s in SURFACES}),
+    "feedback": lambda x: x.assign(rudder_rad=0.4 * x["r_radps"]),
+    "flow-angles": lambda x: x.drop(columns="alpha_rad"),
+    "calibration": lambda x: x.assign(q_radps=x["q_radps"] + 0.15),
+    "sensor-agreement": lambda x: x.assign(
+        p_radps=x["p_radps"] + 0.3, q_radps=1.1 * x["q_radps"] + 0.2
+    ),
+}
+
+
+@pytest.mark.parametrize("check", OF_TABLES)
+def test_what_changes_no_column_says_that_accepting_overrides_nothing(
+    check: str, record: pd.DataFrame, tmp_path: Path
+) -> None:
+    path = tmp_path / "x.csv"
+    OF_TABLES[check](record).to_csv(path, index=False)
+    overrides_nothing(check, path, "--model", "short-period", "--model", "dutch-roll")
+
+
+@pytest.mark.parametrize("check", ["surface-rate", "instrument-errors"])
+def test_so_do_those_of_an_autopilots_log(check: str, tmp_path: Path) -> None:
+    path = write("dataflash", tmp_path)
+    # Positions under a name that no reader knows: a log without GPS.
+    path.write_bytes(path.read_bytes().replace(b"GPS\0", b"XPS\0"))
+    overrides_nothing(check, path, "--model", "roll")
+
+
+def overrides_nothing(check: str, path: Path, *how: str) -> None:
+    plain, accepted = identified(path, *how), identified(path, *how, "--accept", check)
+    [before] = [f for f in plain["findings"] if f["check"] == check]
+    [after] = [f for f in accepted["findings"] if f["check"] == check]
+    assert before["causes"]
+    assert after["done"] == f"accepted, which overrides nothing: {before['done']}"
+    assert after["accepted"]
+    assert after["open"]
+    for was, now in zip(plain["answers"], accepted["answers"], strict=True):
+        assert was["marks"] == now["marks"]
+
+
+def test_a_check_that_found_nothing_is_said(record: pd.DataFrame, tmp_path: Path) -> None:
+    record.to_csv(tmp_path / "x.csv", index=False)
+    found = identified(tmp_path / "x.csv", "--model", "short-period", "--accept", "density")
+    assert "accepted check density found nothing in these data" in found["notes"]
+
+
+def test_throttle_in_per_cent_hides_no_surface(record: pd.DataFrame, tmp_path: Path) -> None:
+    """It was the only maneuver found, and the flight was refused."""
+    times("throttle", 100.0)(record).to_csv(tmp_path / "x.csv", index=False)
+    found = identified(tmp_path / "x.csv", "--model", "short-period", "--accept", "throttle")
+    assert found["answers"]
