@@ -1,5 +1,6 @@
 """Options of the network from outside: start, lambda, rho, iterations; and how methods settle."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -143,8 +144,30 @@ def test_the_answer_says_since_when_it_settled(
     table: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert identified(table, "recursive") == 0
-    [line] = [x for x in capsys.readouterr().out.splitlines() if "within 10 % of its end" in x]
-    since = {x.split()[0]: float(x.split()[1]) for x in line.split(": ")[1].split(", ")}
+    [line] = [x for x in capsys.readouterr().out.splitlines() if "settled, within 10 %" in x]
+    settled, *rest = line.split("): ")[1].split("; ")
+    since = {x.split()[0]: float(x.split()[1]) for x in settled.split(", ")}
     assert 0.0 < since["M_alpha"] < 5.0
+    assert identified(table, "recursive", "--json") == 0
+    [answer] = json.loads(capsys.readouterr().out)["answers"]
+    told = answer["settling"]
+    assert told["step"] == "t_s"
+    assert {k: round(v, 2) for k, v in told["since"].items()} == since
+    assert bool(rest) == bool(told["not_settled"])
     assert identified(table, "hopfield-line-search", "--method-option", "iterations=2") == 0
     assert "error of the original program" in capsys.readouterr().out
+
+
+def test_what_moves_until_the_end_has_not_settled(
+    table: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    few = ["--method-option", "iterations=20", "--method-option", "start=zero"]
+    assert identified(table, "hopfield", *few, "--json") == 0
+    [answer] = json.loads(capsys.readouterr().out)["answers"]
+    told = answer["settling"]
+    assert (told["step"], told["end"]) == ("iteration", 20.0)
+    assert "M_alpha" in told["not_settled"]
+    assert all(told["since"][name] > 17.0 for name in told["not_settled"])
+    assert identified(table, "equation-error", "--json") == 0
+    [answer] = json.loads(capsys.readouterr().out)["answers"]
+    assert answer["settling"] is None

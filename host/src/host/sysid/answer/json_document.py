@@ -13,6 +13,7 @@ from host.sysid.answer.converted_marks import converted_marks
 from host.sysid.answer.marks import Verdict
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.servo_lines import servo_document
+from host.sysid.answer.settling_history import settling_document
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, unpredicted_states
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.coefficients.coefficient_fit import METHOD
@@ -142,6 +143,7 @@ def answer_document(
             for c in answer.coefficients
         },
         "modes": mode_document(answer.modes),
+        "settling": settling_document(answer),
         "fit": {
             kind: {
                 f.name: {

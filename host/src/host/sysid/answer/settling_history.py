@@ -3,16 +3,44 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from host.sysid.answer.atomic_files import atomic_write
 from host.sysid.flight.linear_answer import Answer
 
+SETTLED = 0.1  # of the end
+LATE = 0.85  # of all steps: what moves straight on is within a tenth of its end from 0.9 on
 # What a step is, by what a method notes of it.
-SETTLED = 0.1
 STEPS = {"history_step": "iteration", "history_s": "t_s"}
+
+
+@dataclass(frozen=True, slots=True)
+class Settling:
+    """Since when each parameter stayed within a tenth of its end.
+
+    Attributes
+    ----------
+    step : str
+        ``iteration``, or ``t_s``: time of the data fitted, one maneuver behind the other.
+    end : float
+        The last step.
+    since : mapping of str to float
+        Step by parameter.
+    """
+
+    step: str
+    end: float
+    since: Mapping[str, float]
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """Parameters that had not settled when the steps ended."""
+        return tuple(name for name, when in self.since.items() if when > LATE * self.end)
 
 
 def has_history(answer: Answer) -> bool:
@@ -20,29 +48,59 @@ def has_history(answer: Answer) -> bool:
     return "history" in answer.result.details
 
 
-def settling_lines(answer: Answer) -> list[str]:
-    """Return since when each parameter stayed within a tenth of its end, if noted."""
+def settling_of(answer: Answer) -> Settling | None:
+    """Return since when each parameter stayed within a tenth of its end; None if not noted."""
     if not has_history(answer):
-        return []
+        return None
     details = answer.result.details
     history = np.atleast_2d(details["history"])[:, : len(answer.model.parameters)]
-    key, unit = ("history_s", " s") if "history_s" in details else ("history_step", "")
+    key = next(key for key in STEPS if key in details)
     at = np.asarray(details[key])
     far = np.abs(history - history[-1]) > SETTLED * np.abs(history[-1])
-    since = []
-    for k, parameter in enumerate(answer.model.parameters):
-        last = np.flatnonzero(far[:, k])
-        begin = at[min(int(last[-1]) + 1, len(at) - 1)] if len(last) else at[0]
-        since.append(f"{parameter.name} {begin:.4g}{unit}")
-    of = "time" if unit else "iteration"
-    lines = [f"  within 10 % of its end since ({of}): {', '.join(since)}"]
+    # Far from its end for the last time, and the step behind it.
+    left = [np.flatnonzero(far[:, k]) for k in range(history.shape[1])]
+    since = [at[min(int(last[-1]) + 1, len(at) - 1)] if len(last) else at[0] for last in left]
+    return Settling(
+        STEPS[key],
+        float(at[-1]),
+        {p.name: float(when) for p, when in zip(answer.model.parameters, since, strict=True)},
+    )
+
+
+def settling_lines(answer: Answer) -> list[str]:
+    """Return since when each parameter stayed within a tenth of its end, if noted."""
+    found = settling_of(answer)
+    if found is None:
+        return []
+    timed = found.step == STEPS["history_s"]
+    show, of = ("{:.2f}", "s of the data fitted") if timed else ("{:.0f}", "iteration")
+    since = ", ".join(f"{name} {show.format(when)}" for name, when in found.since.items())
+    moving = f"; not settled: {', '.join(found.moving)}" if found.moving else ""
+    lines = [
+        f"  settled, within 10 % of its end, since ({of}, of {show.format(found.end)}): "
+        f"{since}{moving}"
+    ]
+    details = answer.result.details
     if "history_error_percent" in details:
         error = np.asarray(details["history_error_percent"])
         lines.append(
-            f"  error of the original program {error[0]:.4g} to {error[-1]:.4g} % in {at[-1]:.0f}"
-            " sweeps"
+            f"  error of the original program {error[0]:.4g} to {error[-1]:.4g} % in"
+            f" {found.end:.0f} sweeps"
         )
     return lines
+
+
+def settling_document(answer: Answer) -> dict[str, Any] | None:
+    """Return the same for JSON; None if a method notes nothing."""
+    found = settling_of(answer)
+    if found is None:
+        return None
+    return {
+        "step": found.step,
+        "end": found.end,
+        "since": dict(found.since),
+        "not_settled": list(found.moving),
+    }
 
 
 def write_history(path: Path, answer: Answer) -> None:
