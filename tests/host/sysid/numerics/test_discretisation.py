@@ -158,6 +158,16 @@ def test_a_diverging_response_is_reported_not_returned() -> None:
     assert problem.respond(theta) is None
 
 
+def test_noise_of_what_dies_away_within_a_sample_is_that_of_a_steady_state() -> None:
+    """The exponential behind it grows as fast as states decay: at e^37 all of it was rounding, one
+    entry eight times too large."""
+    A, intensity = np.array([[-16.0, -16.0], [0.0, -1860.0]]), np.array([0.0, 0.12])
+    F, Q = discrete_noise(A, intensity, 0.02)
+    steady = linalg.solve_continuous_lyapunov(A, -np.diag(intensity))
+    np.testing.assert_allclose(F, linalg.expm(0.02 * A), atol=1e-14)
+    np.testing.assert_allclose(Q, steady - F @ steady @ F.T, rtol=1e-9)
+
+
 def test_noise_of_a_model_that_diverges_within_a_sample_says_nothing() -> None:
     """A search tries such models; a user saw two warnings of numpy on the terminal."""
     with warnings.catch_warnings():

@@ -10,7 +10,7 @@ from host.arrays import Array
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.filter_problem import FilterProblem, SteadyStateFilter
-from host.sysid.numerics.process_noise import van_loan
+from host.sysid.numerics.process_noise import halvings_of, van_loan
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +148,7 @@ def _noise_sensitivities(
     problem: FilterProblem, A: Array, intensity: Array, dt_s: float, A_slopes: Array
 ) -> tuple[Array, Array]:
     """Return derivatives of F and Q of a sample, each (common and process, n, n)."""
-    n = len(A)
+    n, halvings = len(A), halvings_of(A, dt_s)
     row, column, parameter = np.nonzero(A_slopes)
     gain = A_slopes[row, column, parameter]
     driven_states = np.array(problem.process_index, dtype=np.int64)
@@ -158,7 +158,7 @@ def _noise_sensitivities(
         2 * n,
         0,
         False,
-        dt_s,
+        dt_s / 2.0**halvings,
         np.concatenate([row, n + column, driven_states]),
         np.concatenate([column, n + row, n + driven_states]),
         np.concatenate([parameter, parameter, common + np.arange(len(driven_states))]),
@@ -167,5 +167,9 @@ def _noise_sensitivities(
     )
     slopes = slopes.transpose(2, 0, 1)
     F, dF = E[n:, n : 2 * n].T, slopes[:, n:, n : 2 * n].transpose(0, 2, 1)
-    dQ = dF @ E[:n, n : 2 * n] + F @ slopes[:, :n, n : 2 * n]
+    Q, dQ = F @ E[:n, n : 2 * n], dF @ E[:n, n : 2 * n] + F @ slopes[:, :n, n : 2 * n]
+    for _ in range(halvings):
+        one_side = dF @ (Q @ F.T)
+        dQ = dQ + one_side + one_side.transpose(0, 2, 1) + F @ dQ @ F.T
+        Q, dF, F = Q + F @ Q @ F.T, dF @ F + F @ dF, F @ F
     return dF, 0.5 * (dQ + dQ.transpose(0, 2, 1))

@@ -10,6 +10,9 @@ from scipy import linalg
 from host.arrays import Array
 from host.sysid.numerics.discretisation import discretise
 
+MOST_DECAY = 8.0  # of exp: e^8 of rounding
+MOST_HALVINGS = 40
+
 
 def air_states(states: Sequence[str]) -> list[int]:
     """Return which states are air, which moves already when a record begins: ``gust...``."""
@@ -46,15 +49,29 @@ def discrete_noise(A: Array, intensity: Array, dt_s: float) -> tuple[Array, Arra
     dt_s : float
         Sample period, s.
     """
-    n = len(A)
+    n, halvings = len(A), halvings_of(A, dt_s)
     none = np.zeros(0, dtype=np.int64)
+    part_s = dt_s / 2.0**halvings
     E, _ = discretise(
-        van_loan(A, intensity), 2 * n, 0, False, dt_s, none, none, none, np.zeros(0), 0
+        van_loan(A, intensity), 2 * n, 0, False, part_s, none, none, none, np.zeros(0), 0
     )
     F = np.ascontiguousarray(E[n:, n : 2 * n].T)
     with np.errstate(over="ignore", invalid="ignore"):  # of a model that diverges within a sample
         Qd = F @ E[:n, n : 2 * n]
+        for _ in range(halvings):
+            Qd, F = Qd + F @ Qd @ F.T, F @ F
     return F, 0.5 * (Qd + Qd.T)
+
+
+def halvings_of(A: Array, dt_s: float) -> int:
+    """Return how often to halve a sample so that nothing decays by more than `MOST_DECAY` in it.
+
+    The exponential has what grows as fast as states decay: where that is 1e16, Q is rounding.
+    """
+    norm = float(np.max(np.sum(np.abs(A), axis=1), initial=0.0)) * dt_s
+    if not MOST_DECAY < norm < np.inf:
+        return 0
+    return min(int(np.ceil(np.log2(norm / MOST_DECAY))), MOST_HALVINGS)
 
 
 def van_loan(A: Array, intensity: Array) -> Array:
