@@ -8,10 +8,10 @@ from host.sysid.estimators.filter_error import fit_filter_error
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
 from host.sysid.numerics.filter_problem import FilterProblem
-from host.sysid.numerics.filter_scoring import whitened_innovation_sensitivities
-from host.sysid.numerics.restricted_likelihood import half_log_determinants, restricted_slopes
+from host.sysid.numerics.restricted_likelihood import restricted_slopes
 
 DT_S, RECORD_S, RECORDS = 0.02, 2.5, 8
+N_R = -2.4
 L_P, LAG, L_DA, GUST, GYRO_RADPS = -16.0, 5.0, 150.0, 0.5, 0.003
 PROCESS = ("gust_roll_radps",)
 
@@ -67,40 +67,23 @@ def _cut(whole: Maneuver) -> list[Maneuver]:
     return [Maneuver(DT_S, u, y) for u, y in pairs]
 
 
-def _problem() -> tuple[FilterProblem, np.ndarray]:
-    """Return records of two lengths and unknowns away from any optimum."""
-    model, records = _rolling(), _cut(_flown(1))[:3]
+@pytest.mark.parametrize("growth_radps", [0.0, 8.0])
+def test_all_noise_alike_takes_one_for_every_constant(growth_radps: float) -> None:
+    """ln det (X' S^-1 X) / 2 falls by one for each constant where S grows by e^2, whatever the
+    aircraft: one that diverges too, and records of two lengths."""
+    records = _cut(_flown(1))[:3]
     records[1] = Maneuver(DT_S, records[1].inputs[:90], records[1].outputs[:90])
-    problem = FilterProblem(model, records, PROCESS)
+    problem = FilterProblem(_rolling(), records, PROCESS)
     theta = problem.output_problem.first_guess()
-    return problem, np.concatenate([theta, np.log([0.7 * GUST, 2.0 * GYRO_RADPS])])
-
-
-def test_information_on_the_constants_is_that_of_their_slopes() -> None:
-    problem, theta = _problem()
-    point = problem.evaluate(theta)
-    assert point is not None
-    found = half_log_determinants(problem, theta)
-    assert found[0] == found[2] != found[1]
-    slopes = whitened_innovation_sensitivities(problem, theta, point)
-    for k, each in enumerate(slopes):
-        own = problem.output_problem.columns(k)[problem.output_problem.n_common :]
-        J = each[..., own].reshape(-1, len(own))
-        assert found[k] == pytest.approx(0.5 * np.linalg.slogdet(J.T @ J)[1], abs=1e-9)
-
-
-def test_slopes_are_those_of_differences() -> None:
-    problem, theta = _problem()
+    theta[0] = growth_radps or L_P
+    theta = np.concatenate([theta, np.log([0.7 * GUST, 2.0 * GYRO_RADPS])])
     bounds = np.full(len(theta), 0.1)
     bounds[1] = 0.0
     found = restricted_slopes(problem, theta, bounds)
-    for k, name in enumerate(problem.names):
-        width = np.zeros(len(theta))
-        width[k] = 1e-4
-        up, down = (half_log_determinants(problem, theta + s * width) for s in (1.0, -1.0))
-        expected = np.zeros(3) if bounds[k] == 0.0 else (up - down) / 2e-4
-        np.testing.assert_allclose(found[:, k], expected, atol=2e-3, err_msg=name)
-    assert np.any(found[:, 0] != 0.0)
+    np.testing.assert_allclose(found[:, -2:].sum(axis=1), -2.0, rtol=2e-3)
+    assert not found[:, 1].any()
+    assert np.all(found[:, 0] != 0.0)
+    assert found[0, 0] == found[2, 0] != found[1, 0]
 
 
 def test_constants_that_cannot_be_told_apart_change_nothing() -> None:
@@ -119,7 +102,6 @@ def test_constants_that_cannot_be_told_apart_change_nothing() -> None:
     theta = np.concatenate(
         [problem.output_problem.first_guess(), np.log([0.7 * GUST, 2.0 * GYRO_RADPS])]
     )
-    assert np.isnan(half_log_determinants(problem, theta)).all()
     assert not restricted_slopes(problem, theta, np.ones(len(theta))).any()
     plain, same = (
         fit_filter_error(model, records, process=PROCESS, compare_noise=False, restricted=r)
@@ -147,6 +129,50 @@ def test_the_lag_of_rolling_air_is_right_in_short_records() -> None:
     assert fitted > 0.1
     assert abs(restricted) < 0.05
     assert np.std(lags[:, 1]) < np.std(lags[:, 0])
+
+
+@pytest.mark.usefixtures("machine_code")
+def test_damping_is_right_in_short_records() -> None:
+    """A rate that air alone moves seemed to die away 1.5 times as fast where each record has a bias
+    of its own; what the bias does to the rate, counted as noise, took nothing of that off."""
+    model = replace(
+        _rolling(),
+        states=("r_radps",),
+        outputs=("r_radps",),
+        A=np.zeros((1, 1)),
+        B=np.zeros((1, 1)),
+        C=np.ones((1, 1)),
+        terms=(Term("A", 0, 0, "N_r"),),
+        parameters=(Parameter("N_r", N_R),),
+        state_biases=("r_radps",),
+        initial_states=("r_radps",),
+    )
+    found = np.array(
+        [
+            [
+                fit_filter_error(
+                    model, _yawed(seed), process=("r_radps",), compare_noise=False, restricted=r
+                ).value("N_r")
+                for r in (False, True)
+            ]
+            for seed in range(24)
+        ]
+    )
+    fitted, restricted = found.mean(axis=0) / N_R
+    assert fitted > 1.3
+    assert abs(restricted - 1.0) < 0.15
+
+
+def _yawed(seed: int) -> list[Maneuver]:
+    """Return short records of a yaw rate that air moves."""
+    rng = np.random.default_rng(seed)
+    samples, decay = round(RECORD_S / DT_S), np.exp(N_R * DT_S)
+    kick = GUST * np.sqrt((1.0 - decay**2) / (-2.0 * N_R))
+    r = [GUST / np.sqrt(-2.0 * N_R) * rng.standard_normal()]
+    for _ in range(RECORDS * samples - 1):
+        r.append(decay * r[-1] + kick * rng.standard_normal())
+    measured = np.array(r) + GYRO_RADPS * rng.standard_normal(len(r))
+    return _cut(Maneuver(DT_S, np.zeros((len(r), 1)), measured[:, None]))
 
 
 def _lags(records: list[Maneuver]) -> list[float]:
