@@ -196,6 +196,6 @@ def _say(written: list[Path]) -> None:
     pictures = [path for path in written if path.suffix == ".svg"]
     parts = [str(path) for path in written if path not in pictures]
     if pictures:
-        parts.append(f"{len(pictures)} pictures in {pictures[0].parent}")
+        parts.append(f"{len(pictures)} picture{'s' * (len(pictures) > 1)} in {pictures[0].parent}")
     if parts:
         print(f"wrote {', '.join(parts)}", file=sys.stderr)

@@ -83,7 +83,10 @@ def run(args: argparse.Namespace) -> int:
         print(option_words(found.to_json() if args.json else found.to_text()))
         if args.plots is not None:
             written = found.plot().save(args.plots)
-            print(f"wrote {len(written)} pictures in {args.plots}", file=sys.stderr)
+            print(
+                f"wrote {len(written)} picture{'s' * (len(written) > 1)} in {args.plots}",
+                file=sys.stderr,
+            )
     except IdentificationError as error:
         raise IdentificationError(option_words(str(error))) from error
     return int(ExitCode.OK)

@@ -271,3 +271,34 @@ def test_a_slow_column_is_predicted_too(saved: Path) -> None:
     found = figures(host.predict(saved, table.assign(alpha_rad=held)).to_json())
     assert found["free_simulation"]["alpha_rad"]["nrmse"] < 0.1
     assert found["windows"][1]["over_persistence"]["q_radps"] < 0.2
+
+
+def test_derivatives_that_nobody_estimated_are_said(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    text = 'states = ["q_radps"]\ninputs = ["elevator_rad"]\noutputs = ["q_radps"]\n'
+    path.write_text(text + 'A = [["M_q"]]\nB = [["M_de"]]\n[parameters]\nM_q = -9.0\n')
+    found = host.predict(path, recorded(2))
+    assert "held at zero, for mine.toml gives no start of them: M_de" in found.to_text()
+
+
+def test_files_in_the_wrong_order_or_empty_are_one_line(
+    saved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    record, empty = tmp_path / "one.csv", tmp_path / "empty.toml"
+    empty.write_text("")
+    capsys.readouterr()
+    for words, said in (
+        ([record, saved], "the saved model is named first, behind it the records"),
+        ([empty, record], "nothing in it, expected states"),
+    ):
+        assert main(["predict", *map(str, words)]) == 2
+        err = capsys.readouterr().err
+        assert said in err
+        assert err.count("\n") == 1
+
+
+def test_a_record_without_the_maneuver_names_those_it_has(saved: Path) -> None:
+    other = recorded(2).rename(columns={"elevator_rad": "aileron_rad"})
+    other["elevator_rad"] = 0.0
+    with pytest.raises(IdentificationError, match="elevator_rad; found only aileron_rad"):
+        host.predict(saved, other)

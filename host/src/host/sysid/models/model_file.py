@@ -120,6 +120,10 @@ def read_trim(path: Path) -> Trim:
 
 def model_from(document: Mapping[str, object], source: str = "model") -> LinearModel:
     """Build a model from a parsed document."""
+    if not document:
+        raise IdentificationError(
+            f"{source}: nothing in it, expected states, inputs, outputs, A to D"
+        )
     unknown_keys = sorted(set(document) - KEYS)
     if unknown_keys:
         raise IdentificationError(

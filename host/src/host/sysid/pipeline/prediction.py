@@ -118,7 +118,7 @@ def predict(
     path = path_of("model", model)
     assert path is not None
     path = model_path(path)
-    models = _saved_models(path)
+    models, doubts = _saved_models(path)
     signals = {name for _, m in models for name in (*m.inputs, *m.outputs)} - {CONSTANT}
     sources = listed_flights(flights)
     each = reading_options(
@@ -138,20 +138,32 @@ def predict(
     for source, how in zip(sources, each, strict=True):
         known = aircraft_data(aircraft, how.calibration) if aircraft is not None else None
         ready = prepare(source, how, known)
-        notes = (*(finding.line for finding in ready.flight.findings), *ready.notes)
+        notes = (*(finding.line for finding in ready.flight.findings), *ready.notes, *doubts)
         found.append(simulate(models, ready.flight, notes, constants=constants))
     return Prediction(str(path), tuple(found), constants)
 
 
-def _saved_models(path: Path) -> list[tuple[str, LinearModel]]:
-    """Return the models of a file without free parameters: one, or both axes of an aircraft."""
-    kind = read_document(path).get("kind")
+def _saved_models(path: Path) -> tuple[list[tuple[str, LinearModel]], list[str]]:
+    """Return the models of a file without free parameters: one, or both axes of an aircraft.
+
+    Notes are of parameters that nobody estimated.
+    """
+    try:
+        kind = read_document(path).get("kind")
+    except IdentificationError as error:
+        if path.suffix.lower() == ".toml":
+            raise
+        raise IdentificationError(
+            f"{error}; the saved model is named first, behind it the records"
+        ) from error
     if kind == "nonlinear":
-        return aircraft_models(path)
+        return aircraft_models(path), []
     if kind not in (None, EQUATIONS):
         raise IdentificationError(
             f"{path}: of kind '{kind}', expected a linear model, equations or an aircraft, as"
             " `host identify --save-model` writes them"
         )
     own = read_model(path)
-    return [(own.name, replace(frozen_at(own, own.start), delays=()))]
+    zero = ", ".join(p.name for p in own.parameters if p.start == 0.0)
+    doubts = [f"held at zero, for {path.name} gives no start of them: {zero}"] if zero else []
+    return [(own.name, replace(frozen_at(own, own.start), delays=()))], doubts

@@ -204,10 +204,18 @@ def simulate(
             runs = free_runs(model, data, constants=constants)
             found.append(SimulatedModel(label, model, tuple(data), columns, tuple(runs)))
         else:
-            not_simulated.append(f"{label}: no maneuver of {', '.join(axes)}")
+            not_simulated.append(f"{label}: {_without_maneuver(flight, axes)}")
     if not found:
         raise IdentificationError("; ".join([*not_simulated, *notes]))
     return Simulation(flight.source, tuple(found), (*notes, *not_simulated))
+
+
+def _without_maneuver(flight: ReconstructedFlight, axes: Sequence[str]) -> str:
+    there = ", ".join(sorted({f.axis for f in flight.maneuvers})) or "none at all"
+    return (
+        f"no maneuver of {', '.join(axes)}; found only {there}; argument from_s and argument to_s"
+        " take any stretch"
+    )
 
 
 def identified_models(
