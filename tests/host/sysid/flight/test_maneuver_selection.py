@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from host.cli import main
 from host.sysid.flight.flight_tables import read_columns
@@ -14,10 +15,13 @@ from host.sysid.flight.maneuver_detection import AXES, detect_maneuvers, grade
 from host.sysid.flight.maneuver_selection import (
     excited_axes,
     merge_overlapping,
+    overlap_notes,
     select_maneuvers,
 )
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import model_from
+
+import host
 
 Columns = dict[str, np.ndarray]
 SHORT_PERIOD = model_from(
@@ -82,6 +86,7 @@ def test_a_model_of_ones_own_is_fitted_where_its_input_moved(flight: Columns) ->
     [
         ({"stretches": [(100.0, 120.0)]}, "0 samples, at least 8 .* from 0.02 to 39"),
         ({"stretches": [(12.0, 14.0), (15.0, 15.01)]}, "samples, at least 8"),
+        ({"stretches": [(12.0, 12.3)]}, r"0\.3\d* s of data, at least 0\.9 s"),
         ({"stretches": [(20.0, 10.0)]}, "start is not before the end"),
         ({"stretches": [(float("nan"), None)]}, "start is not before the end"),
         ({"stretches": [(12.0, None)], "numbers": [1]}, "excludes argument from_s"),
@@ -107,6 +112,25 @@ def test_a_gap_divides_a_stretch(flight: Columns) -> None:
     none = {**flight, **{f"{s}_rad": 0.0 * t for s in ("elevator", "aileron", "rudder")}}
     with pytest.raises(IdentificationError, match="none was found"):
         select_maneuvers(none, numbers=[1])
+
+
+def test_stretches_that_overlap_are_said(flight: Columns, tmp_path: Path) -> None:
+    """They are one: no sample counts twice; those that only touch stay two."""
+    assert overlap_notes([(12.0, 14.0), (14.0, 16.0)]) == []
+    assert overlap_notes([(16.0, None), (12.0, 14.0)]) == []
+    assert overlap_notes([(12.0, 16.0), (9.0, 13.0)]) == [
+        "stretches overlap from 12 s on: fitted as one, no sample twice"
+    ]
+    assert "from 14 s on" in overlap_notes([(12.0, None), (14.0, None)])[0]
+    path = tmp_path / "x.csv"
+    pd.DataFrame(flight).to_csv(path, index=False)
+    found = host.identify(
+        path,
+        models="short-period",
+        methods="equation-error",
+        stretches=[(12.0, 16.0), (15.0, 20.0)],
+    )
+    assert any("overlap from 15 s on" in line for line in found.verdict)
 
 
 def test_a_stretch_is_a_maneuver_whatever_moved_in_it(flight: Columns) -> None:

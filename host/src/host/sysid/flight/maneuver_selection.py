@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
@@ -19,6 +20,7 @@ from host.sysid.identification_error import IdentificationError
 
 SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad")
 FEWEST = 8  # samples, as a maneuver needs
+SHORTEST_STRETCH_S = 0.9  # two short periods of a trainer; 0.35 s put two derivatives under "trust"
 SHARED_S = 0.1  # windows that overlap by more are one
 TOUCHING_S = 0.1  # nothing moved between windows no further apart
 HELD_OUT_FROM = 3  # maneuvers of an axis, of which one is held out
@@ -81,10 +83,34 @@ def _span_maneuvers(columns: Mapping[str, Array], span: TimeSpan) -> list[Detect
             f" {t[0]:.6g} to {t[-1]:.6g} s"
         )
     measured = inside & ~(columns.get("bridged", np.zeros(len(t))) > 0.0)
-    parts = [part for part in runs_of(measured) if len(part) >= FEWEST]
-    if not parts:
+    if not measured.any():
         raise IdentificationError(f"{asked}: the data have nothing but gaps there")
+    length_s = float(np.median(np.diff(t))) * int(measured.sum())
+    parts = [part for part in runs_of(measured) if _fitted(t[part]) >= FEWEST]
+    if length_s < SHORTEST_STRETCH_S or not parts:
+        raise IdentificationError(
+            f"{asked}: {length_s:.2g} s of data, at least {SHORTEST_STRETCH_S:g} s are needed"
+            + (", in longer pieces" if length_s >= SHORTEST_STRETCH_S else "")
+        )
     return [item for part in parts for item in _given(columns, part)]
+
+
+def overlap_notes(stretches: Sequence[TimeSpan]) -> list[str]:
+    """Return a note where stretches of one record share samples: those count once."""
+    spans = sorted(
+        (-np.inf if first is None else first, np.inf if last is None else last)
+        for first, last in stretches
+    )
+    shared = [b for a, b in itertools.pairwise(spans) if b[0] < a[1] - SHARED_S]
+    if not shared:
+        return []
+    begins = ", ".join("the start" if first == -np.inf else f"{first:g} s" for first, _ in shared)
+    return [f"stretches overlap from {begins} on: fitted as one, no sample twice"]
+
+
+def _fitted(t: Array) -> int:
+    """Return how many samples of a part are behind the lead that is taken for its trim."""
+    return int(np.sum(t > t[0] + LEAD_S)) if len(t) else 0
 
 
 def _given(columns: Mapping[str, Array], part: IntArray) -> list[DetectedManeuver]:

@@ -29,7 +29,7 @@ from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.feedback_findings import feedback_findings
 from host.sysid.flight.flight_tables import read_flight_columns, source_name
 from host.sysid.flight.hidden_angles import no_instrument_errors_finding, no_vanes_finding
-from host.sysid.flight.maneuver_selection import select_maneuvers
+from host.sysid.flight.maneuver_selection import overlap_notes, select_maneuvers
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight, reconstruct_flight
 from host.sysid.flight.small_inputs import whole_flight
 from host.sysid.identification_error import IdentificationError
@@ -87,6 +87,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
     if instrument is not None or commands:
         notes += recording_notes(sensors)
     found = select_maneuvers(columns, stretches=how.stretches, numbers=how.maneuvers)
+    notes += overlap_notes(how.stretches)
     if not found:
         found, small = whole_flight(columns)
         findings += small
