@@ -111,6 +111,19 @@ def test_what_needs_the_airspeed_says_so(pitching: pd.DataFrame, method: str) ->
         host.identify(pitching, models=model, methods=method)
 
 
+def test_without_airspeed_the_default_models_are_those_that_need_none(
+    pitching: pd.DataFrame,
+) -> None:
+    found = host.identify(pitching)
+    assert [a.template for a in found.linear] == ["short-period"]
+    assert any("without airspeed_mps longitudinal and lateral" in note for note in found.notes)
+
+
+def test_a_table_without_a_surface_says_so(pitching: pd.DataFrame) -> None:
+    with pytest.raises(IdentificationError, match=r"no column of a surface .*argument mapping"):
+        host.identify(pitching.drop(columns="elevator_rad"), models="short-period")
+
+
 def test_a_model_saved_without_airspeed_can_be_read(pitching: pd.DataFrame, tmp_path: Path) -> None:
     table, saved = tmp_path / "pitch.csv", tmp_path / "m.toml"
     pitching.to_csv(table, index=False)

@@ -358,7 +358,7 @@ def test_a_hostile_model_writes_into_its_folder_only(
         ("x.csv", {"models": [3]}, "a model is of type int, expected a name"),
         ("x.csv", {"methods": 3}, "unknown method 3"),
         (pd.DataFrame({"q_radps": np.zeros(9)}), {}, "table: no column t_s"),
-        (pd.DataFrame({"t_s": np.arange(99.0) / 50.0}), {}, "no maneuver found"),
+        (pd.DataFrame({"t_s": np.arange(99.0) / 50.0}), {}, "no column of a surface"),
         ("x.csv", {"models": "longitudnal"}, "did you mean longitudinal"),
         ("x.csv", {"models": "coefficents"}, "did you mean coefficients"),
         ("x.csv", {"models": ""}, "no model ''"),

@@ -9,7 +9,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.flight.maneuver_detection import grade
-from host.sysid.flight.maneuver_selection import HELD_OUT_FROM, joined_windows
+from host.sysid.flight.maneuver_selection import HELD_OUT_FROM, SURFACES, joined_windows
 from host.sysid.flight.reconstructed_flight import (
     FlownManeuver,
     ReconstructedFlight,
@@ -45,6 +45,10 @@ def fitted_and_held_out(
         If there is none.
     """
     every = [f for flight in flights for f in flight.maneuvers]
+    if not every and not any(axis in one.recorded for one in flights for axis in SURFACES):
+        raise NoManeuverError(
+            f"no column of a surface ({', '.join(SURFACES)}); name one in a map (argument mapping)"
+        )
     if not every:
         raise NoManeuverError(
             "no maneuver found: no surface moved by more than 1.4 degrees at once; give"

@@ -24,6 +24,17 @@ from host.sysid.pipeline.arguments import listed
 COEFFICIENTS = "coefficients"
 THRUST = ("thrust_n", "power_w")
 DEFAULT_MODELS = ("longitudinal", "lateral")
+# What stands in the place of a default model, and why.
+WITHOUT_AIRSPEED = (
+    {"longitudinal": "short-period", "lateral": "dutch-roll"},
+    "without airspeed_mps longitudinal and lateral cannot be told: short-period and dutch-roll by"
+    " angles and rates in their place; name its column in a map (argument mapping) if there is one",
+)
+WITHOUT_VANES = (
+    {"longitudinal": "short-period"},
+    "without vanes longitudinal (speed, drag and lift curve) cannot be told: short-period by q"
+    " and az in its place",
+)
 ModelName = str | Path | LinearModel | CoefficientModel
 
 
@@ -98,8 +109,8 @@ def requested_models(given: ModelName | Iterable[ModelName] | None) -> Models:
     return Models(tuple(linear), _terms(terms[0]) if terms else None, bool(listed(given)))
 
 
-def without_vanes(asked: Models, columns: Sequence[Collection[str]]) -> tuple[Models, list[str]]:
-    """Return the models of flights, and a note where the default ones change for want of a vane.
+def possible_models(asked: Models, columns: Sequence[Collection[str]]) -> tuple[Models, list[str]]:
+    """Return the models of flights, and a note where the default ones change for want of a column.
 
     Parameters
     ----------
@@ -107,14 +118,16 @@ def without_vanes(asked: Models, columns: Sequence[Collection[str]]) -> tuple[Mo
     columns : sequence of collections of str
         Of each flight.
     """
-    if asked.named or any("alpha_rad" in c or "az_mps2" not in c for c in columns):
+    if asked.named:
         return asked, []
-    instead = {"longitudinal": "short-period"}
+    if not all("airspeed_mps" in c for c in columns):
+        instead, note = WITHOUT_AIRSPEED
+    elif all("alpha_rad" not in c and "az_mps2" in c for c in columns):
+        instead, note = WITHOUT_VANES
+    else:
+        return asked, []
     linear = tuple((instead.get(name, name), own) for name, own in asked.linear)
-    return replace(asked, linear=linear), [
-        "without vanes longitudinal (speed, drag and lift curve) cannot be told: short-period by q"
-        " and az in its place"
-    ]
+    return replace(asked, linear=linear), [note]
 
 
 def _terms(given: CoefficientModel | Path | str) -> CoefficientModel:

@@ -35,9 +35,9 @@ from host.sysid.pipeline.reading_options import OfEach, reading_options
 from host.sysid.pipeline.requested_models import (
     ModelName,
     Models,
+    possible_models,
     requested_methods,
     requested_models,
-    without_vanes,
 )
 
 if TYPE_CHECKING:
@@ -152,7 +152,7 @@ def identify(
     recorded = distinct_flights([one.flight for one in ready])
     true = _truth(truth, len(recorded))
     expected = _prior(prior, recorded, known)
-    asked, instead = without_vanes(asked, [flight.recorded for flight in recorded])
+    asked, instead = possible_models(asked, [flight.recorded for flight in recorded])
     notes += instead
     direct, doubts = _coefficients(asked, known, recorded)
     linear, unfit = _linear(asked, by, options, known, recorded)
