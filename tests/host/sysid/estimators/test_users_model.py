@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.arrays import Array
+from host.sysid.estimators import filter_error
 from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
@@ -152,3 +153,17 @@ def test_what_the_gust_filter_cannot_fit_it_refuses_in_a_line(
         )
     assert "\n" not in str(caught.value)
     assert "filter-error and output-error are there" in str(caught.value)
+
+
+def test_a_filter_that_turns_out_singular_leaves_the_other_noise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It was an internal error; the rest of the answer stands."""
+
+    def singular(*_: object) -> None:
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr(filter_error, "fisher_scoring", singular)
+    found = fit_by_evidence(short_period(), [flown("coloured")], AIRSPEED_MPS)
+    assert found.method == "output-error"
+    assert "gust: filter-error-gust does not converge on mine" in found.remarks[0]

@@ -116,6 +116,7 @@ def test_entries_are_parsed() -> None:
         ({"parameters": {"k": {"prior_sd": 0}}}, "prior_sd is 0, expected above 0"),
         ({"parameters": {"k": {"lower": 1, "upper": -1}}}, "lower 1 is not below upper -1"),
         ({"parameters": {"k": {"start": 3, "upper": 2}}}, "start 3 is not between .* upper 2"),
+        ({"inputs": ["a"]}, "a is a state and an input"),
         ({"delays": [{"name": "d", "outputs": "a"}]}, "delay d: outputs must be a list"),
         ({"delays": [{"name": "d", "outputs": ["a"], "prior_sd": 1}]}, "unknown key prior_sd;"),
         ({"delays": [{"name": "d", "outputs": ["a"], "limit_s": -1}]}, "limit_s is -1"),

@@ -220,4 +220,10 @@ class _FilterError(InnovationObjective[InnovationLikelihood]):
         return self._problem.evaluate(theta)
 
     def score(self, theta: Array, trial: InnovationLikelihood) -> tuple[list[Array], list[Array]]:
-        return fisher_scoring(self._problem, theta, trial)
+        try:
+            return fisher_scoring(self._problem, theta, trial)
+        except np.linalg.LinAlgError as error:
+            raise IdentificationError(
+                f"model {self._problem.model.name}: the Kalman filter's gain has no slopes at its"
+                " estimates; these data do not determine the model"
+            ) from error

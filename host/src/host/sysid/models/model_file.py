@@ -132,6 +132,10 @@ def model_from(document: Mapping[str, object], source: str = "model") -> LinearM
     signals = {
         key: names_from(document, key, f"{source}: ") for key in ("states", "inputs", "outputs")
     }
+    if both := [name for name in signals["inputs"] if name in signals["states"]]:
+        raise IdentificationError(
+            f"{source}: {both[0]} is a state and an input: it may be one of them"
+        )
     n, m, p = (len(signals[key]) for key in ("states", "inputs", "outputs"))
     if max(n, m, p) > MOST_SIGNALS:
         raise IdentificationError(
