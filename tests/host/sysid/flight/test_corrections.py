@@ -38,6 +38,7 @@ from host.sysid.compatibility.sensor_corrections import (
 from host.sysid.flight import linear_answer, linear_model
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import identify
+from host.sysid.flight.sampling_error import HOLD
 from host.sysid.flight.systematic_errors import add_systematic_covariance, systematic_error_shifts
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.models.templates import Trim, template
@@ -180,6 +181,7 @@ def test_sensors_that_do_not_agree_are_as_open_as_their_file_leaves_them(
     values = dict(zip(parts.names, parts.values, strict=True))
     assert abs(sensed["elevator_scale"][k] / values["Cm_de"]) == pytest.approx(share, rel=0.05)
     assert {"alpha_scale", "gyro_scale_y", "imu_x_m"} <= sensed.keys()
+    assert np.any(sensed[HOLD] != 0.0)  # surfaces that their file measures move between samples
     assert not {"vane_delay_s", "imu_delay_s", "pitot_delay_s"} & sensed.keys()
 
 

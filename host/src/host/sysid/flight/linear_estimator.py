@@ -30,10 +30,7 @@ from host.sysid.estimators.method_registry import fit, refuse_unless_finite
 from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
 from host.sysid.flight.commanded_surfaces import brought_behind, servo_of
 from host.sysid.flight.estimator import answer_of
-from host.sysid.flight.filter_step import (
-    sensors_known,
-    with_filter_step,
-)
+from host.sysid.flight.filter_step import with_filter_step
 from host.sysid.flight.first_departures import first_departures, remove_departures
 from host.sysid.flight.fitted_maneuvers import (
     NoManeuverError,
@@ -58,7 +55,7 @@ from host.sysid.flight.reconstructed_flight import (
     ReconstructedFlight,
     reconstruct_flight,
 )
-from host.sysid.flight.sampling_error import with_moving_surfaces
+from host.sysid.flight.sampling_error import surfaces_known, with_moving_surfaces
 from host.sysid.flight.trim_departure import (
     NO_SPIN,
     Departure,
@@ -137,7 +134,7 @@ class LinearEstimator:
             used, held = brought_behind(used, servo.setting), brought_behind(held, servo.setting)
         if method == GUST and self.own is None:
             used = with_filter_step(used, model)
-        if self.own is None and sensors_known(used):
+        if self.own is None and surfaces_known(used):
             used, held = with_moving_surfaces(used), with_moving_surfaces(held)
         data = [m.cut(model) for m in used]
         cuts, departing = [m.inside() for m in used], [m.departing() for m in used]

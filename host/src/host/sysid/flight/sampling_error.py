@@ -64,6 +64,12 @@ def hold_shift(
     return (ShiftedEstimate(HOLD, result.estimate + step / NORMAL_95, 1.0, 1.0),)
 
 
+def surfaces_known(maneuvers: Sequence[FlownManeuver]) -> bool:
+    """Return whether a file says how surfaces were measured, whether its sensors agree or not."""
+    found = [m.flight.compatibility or m.flight.calibration_alone for m in maneuvers]
+    return all(c is not None and c.instrument is not None for c in found)
+
+
 def with_moving_surfaces(maneuvers: Sequence[FlownManeuver]) -> list[FlownManeuver]:
     """Return maneuvers whose surfaces move between samples; means of several are smooth already."""
     return [replace(m, surfaces_move=m.block == 1) for m in maneuvers]
