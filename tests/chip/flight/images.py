@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from functools import cache
@@ -82,11 +83,13 @@ def upload(environment: str, bridge: PtyBridge) -> str:
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
+        start_new_session=True,
     ) as running:
         try:
             bridge.serve(lambda: running.poll() is not None, limit_s=240.0)
-        finally:
-            running.kill()
+        except BaseException:
+            os.killpg(running.pid, signal.SIGKILL)  # avrdude too, which would run on alone
+            raise
         said: str = running.communicate()[0]
         assert running.returncode == 0, said
     return said
