@@ -46,7 +46,7 @@ def test_every_file_is_read_and_its_code_is_small(name: str) -> None:
 def test_six_degrees_fly_as_the_longitudinal_model_in_the_plane() -> None:
     plane, space = shipped("longitudinal"), shipped("six_degrees")
     V, alpha, theta, q = 16.0, 0.08, 0.2, 0.3
-    x = np.array([V, alpha, theta, q, 0.0, 0.0])
+    x = np.array([V, alpha, theta, q, 0.0, 0.0, 0.0])
     wings = rates(plane, x, np.array([0.05, 3.0, 0.0, 0.0, 0.0]))
     x = np.array([V * np.cos(alpha), 0.0, V * np.sin(alpha), 0.0, q, 0.0, 0.0, theta, *np.zeros(6)])
     body = rates(space, x, np.array([0.05, 0.0, 0.0, 3.0]))
@@ -78,11 +78,11 @@ def test_a_steady_gust_is_an_angle_of_attack_to_moments_and_none_to_gravity() ->
     plane = shipped("longitudinal")
     V, alpha, theta, w = 16.0, 0.08, 0.2, 0.4
     u = np.array([0.05, 3.0, 0.0, 0.0, 0.0])
-    gusty = rates(plane, np.array([V, alpha, theta, 0.0, w, w]), u)
+    gusty = rates(plane, np.array([V, alpha, theta, 0.0, 0.0, w, w]), u)
     air = np.array([V * np.cos(alpha), V * np.sin(alpha) + w])
-    met = np.array([np.hypot(*air), np.arctan2(air[1], air[0]), theta, 0.0, 0.0, 0.0])
+    met = np.array([np.hypot(*air), np.arctan2(air[1], air[0]), theta, *np.zeros(4)])
     assert gusty["q_radps"] == pytest.approx(rates(plane, met, u)["q_radps"])
-    turning = rates(plane, np.array([V, alpha, theta, 0.0, w, 0.0]), u)
+    turning = rates(plane, np.array([V, alpha, theta, 0.0, 0.0, w, 0.0]), u)
     assert turning["q_radps"] > gusty["q_radps"]  # the air turns with it: less damping
 
 
@@ -99,13 +99,14 @@ def test_a_rolling_gust_moves_the_aircraft_as_its_own_roll_does_the_other_way() 
 def test_the_air_of_six_degrees_is_that_of_the_files_of_one_plane() -> None:
     plane, side, space = shipped("longitudinal"), shipped("lateral"), shipped("six_degrees")
     V, alpha, theta, w, behind = 16.0, 0.08, 0.2, 0.4, 0.1
-    wings = rates(
-        plane, np.array([V, alpha, theta, 0.0, w, behind]), np.array([0.05, 3.0, 0.0, 0.0, 0.0])
-    )
+    front = 0.3
+    gusty = np.array([V, alpha, theta, 0.0, front, w, behind])
+    wings = rates(plane, gusty, np.array([0.05, 3.0, 0.0, 0.0, 0.0]))
     path = [V * np.cos(alpha), 0.0, V * np.sin(alpha), 0.0, 0.0, 0.0, 0.0, theta]
-    air = np.array([*path, 0.0, w, behind, *np.zeros(3)])
+    air = np.array([*path, front, w, behind, *np.zeros(3)])
     body = rates(space, air, np.array([0.05, 0, 0, 3.0]))
     assert body["q_radps"] == pytest.approx(wings["q_radps"])
+    assert body["gust_fore_mps"] == pytest.approx(wings["gust_fore_mps"])
     beta, lagged, roll = 1e-5, 4e-6, 2e-5
     level = np.array([0.0, 0.0, 0.0, 0.0, beta, lagged, roll])
     own = rates(side, level, np.array([0.0, 0.0, V, alpha, theta, 0.0]))
@@ -116,7 +117,7 @@ def test_the_air_of_six_degrees_is_that_of_the_files_of_one_plane() -> None:
 
 
 def test_a_gust_from_the_front_is_airspeed_and_turns_no_path() -> None:
-    """Left out of the path, r times it passed for a side gust: Cn_r was 4 % off."""
+    """Taken for motion, r times it passed for a side gust: Cn_r was 4 % off, and Cm_alpha 3."""
     space = shipped("six_degrees")
     u, r, gust = 16.0, 0.3, 0.8
     inputs = np.array([0.05, 0.0, 0.0, 3.0])
@@ -125,6 +126,12 @@ def test_a_gust_from_the_front_is_airspeed_and_turns_no_path() -> None:
     for name in ("p_radps", "q_radps", "r_radps"):
         assert met[name] == pytest.approx(own[name])
     assert met["v_mps"] - own["v_mps"] == pytest.approx(r * gust)
+    plane, w, q, columns = shipped("longitudinal"), 1.3, 0.2, np.array([0.05, 3.0, 0, 0, 0])
+    still, front = (
+        rates(plane, np.array([np.hypot(a, w), np.arctan2(w, a), 0.1, q, b, 0, 0]), columns)
+        for a, b in ((u, 0.0), (u - gust, gust))
+    )
+    assert front["q_radps"] == pytest.approx(still["q_radps"])
 
 
 def test_flight_path_of_an_aircraft_at_rest_in_a_turn_stands_still() -> None:
