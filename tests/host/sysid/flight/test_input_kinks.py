@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from host.arrays import Array
-from host.sysid.flight.input_kinks import with_means_of_motion, with_means_of_smooth_motion
+from host.sysid.flight.input_kinks import with_means_of_motion
 
 STEP_S = 0.01
 
@@ -50,23 +50,6 @@ def test_a_servo_that_starts_anywhere_is_missed_by_less(radps: float) -> None:
 )
 def test_steps_and_straight_lines_stay(values: list[float]) -> None:
     np.testing.assert_allclose(with_means_of_motion(np.array(values, dtype=float)), values)
-
-
-def test_steps_are_no_smooth_motion() -> None:
-    steps = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, 0.0, 0.0])
-    np.testing.assert_allclose(with_means_of_smooth_motion(steps), steps, atol=1e-12)
-
-
-def test_a_smooth_motion_is_not_made_smaller() -> None:
-    """20 rad/s sampled every 10 ms: lines cut off 0.33 %."""
-    fine = np.arange(3141) / 1000.0
-    motion = np.sin(20.0 * fine)
-
-    def gain(samples: Array) -> float:
-        return float(np.interp(fine, fine[::10], samples) @ motion / (motion @ motion))
-
-    assert gain(motion[::10]) == pytest.approx(1.0 - 0.2**2 / 12.0, abs=2e-4)
-    assert gain(with_means_of_smooth_motion(motion[::10])) == pytest.approx(1.0, abs=6e-4)
 
 
 def test_noise_grows_by_little() -> None:

@@ -59,7 +59,7 @@ def test_a_further_parameter_is_estimated_along(prior_sd: float) -> None:
     assert one_step is not None
     one = replace(still, B=still.B.copy())
     one.B[still.states.index("q_radps"), -1] = 1.0
-    found = one_step.joint(still, TRIM, data, [one], [prior_sd])
+    found = one_step.joint(still, TRIM, data, [(one, data)], [prior_sd])
     count = len(still.parameters)
     added = both.value("extra")
     if prior_sd > 1.0:

@@ -21,9 +21,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.arrays import Array
+from host.arrays import Array, BoolArray
 from host.sysid.estimators.multistart import multistart
 from host.sysid.numerics.ar_noise import ArNoise, choose_order, fit_ar, lagged_moments
+from host.sysid.numerics.between_samples import left_between_samples
 from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
 from host.sysid.numerics.output_error import (
     Optimum,
@@ -85,11 +86,12 @@ def fit_with_ar_noise(
     orders: list[int] | None = None
     refits = 0
     if highest_order > 0:
+        clean = left_between_samples(problem, optimum.theta, optimum.responses)
         while refits < REFITS:
             refits += 1
             before = [n.coefficient for n in noise]
             noise, variance, orders = _fit_ar_models(
-                problem, optimum, noise, variance, highest_order, criterion, orders
+                problem, optimum, noise, variance, highest_order, criterion, orders, clean
             )
             if all(n.order == 0 for n in noise):
                 break
@@ -197,8 +199,13 @@ def _fit_ar_models(
     highest: int,
     criterion: str,
     orders: list[int] | None,
+    clean: BoolArray,
 ) -> tuple[list[ArNoise], Array, list[int]]:
-    """Estimate the AR model of each output by expectation-maximisation at a fixed fit."""
+    """Estimate the AR model of each output by expectation-maximisation at a fixed fit.
+
+    Those that are `clean` leave no noise.
+    """
+    clean = clean | np.isfinite(problem.known_variance)  # known noise is white
     selected = list(orders) if orders is not None else [-1] * len(noise)
     memory = list(noise)
     for round_number in range(MOMENT_ROUNDS):
@@ -210,9 +217,9 @@ def _fit_ar_models(
         for j in range(len(memory)):
             residuals = [r[j] for r in optimum.residuals]
             power = sum(float(e @ e) for e in residuals) / problem.counts[j]
-            # Known noise is white. What a clean column leaves is the input between its samples:
-            # smooth, and driven by the least noise such a memory widened intervals to 70 000 %.
-            if np.isfinite(problem.known_variance[j]) or power <= problem.clean_variance[j]:
+            # What a clean column leaves is the input between its samples: smooth, and driven by the
+            # least noise such a memory widened intervals to 70 000 %.
+            if clean[j] or power <= problem.clean_variance[j]:
                 selected[j] = 0
                 updated.append(ArNoise.white())
                 continue

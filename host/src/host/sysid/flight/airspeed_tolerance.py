@@ -49,7 +49,8 @@ def airspeed_shift(
     if found is None:
         return ()
     faster = replace(trim, airspeed_mps=trim.airspeed_mps * (1.0 + share))
-    step = found.joint(result.model, trim, maneuvers, [retrimmed(result.model, faster)], [1.0])
+    beside = [(retrimmed(result.model, faster), maneuvers)]
+    step = found.joint(result.model, trim, maneuvers, beside, [1.0])
     sd = float(np.sqrt(step.covariance[0, 0])) * found.widened_in(result)
     size = sd if sd < POSTERIOR_PRIOR_RATIO else 1.0
     # What the fit left out stays out: no deviation of a sensor brings it back.

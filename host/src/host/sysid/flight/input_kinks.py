@@ -10,9 +10,9 @@ Harten, J. Comput. Phys. 83, 1989). Samples of a smooth motion move by a twelfth
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from host.arrays import Array
+from host.sysid.numerics.between_samples import shared_by_samples
 
 # Times the curvature beside it. A servo of second order and 30 rad/s has none at 10 ms, one of 60
 # rad/s passes for one: 0.2 ms.
@@ -29,35 +29,7 @@ def with_means_of_motion(values: Array) -> Array:
     """
     if len(values) < 5:
         return values
-    return _shared_by_samples(values, _mean_beside_line(values))
-
-
-def with_means_of_smooth_motion(values: Array) -> Array:
-    """Return the same of a motion without kinks that tell where they are.
-
-    Commands that come every 20 ms bend a servo in every other sample of 10 ms: none stands out. A
-    line cuts the bends off, w^2 dt^2 / 12 of a motion of w rad/s: at 20 rad/s 0.3 %, and so much
-    too large were Cl_p and Cl_da. A cubic between samples does not, and is late nowhere.
-
-    Parameters
-    ----------
-    values : Array, shape (n,)
-        On an even grid. Steps come back as they are: the cubic does not overshoot (Fritsch &
-        Carlson, SIAM J. Numer. Anal. 17, 1980).
-    """
-    if len(values) < 3:
-        return values
-    at = np.arange(len(values), dtype=np.float64)
-    mean = np.diff(PchipInterpolator(at, values).antiderivative()(at))
-    return _shared_by_samples(values, mean - 0.5 * (values[1:] + values[:-1]))
-
-
-def _shared_by_samples(values: Array, missing: Array) -> Array:
-    """Return samples moved by what the mean of each interval lacks, half of it at either end."""
-    result = values.copy()
-    result[:-1] += 0.5 * missing
-    result[1:] += 0.5 * missing
-    return result
+    return shared_by_samples(values, _mean_beside_line(values))
 
 
 def _mean_beside_line(values: Array) -> Array:

@@ -6,7 +6,7 @@ whitened. No fit is repeated (one-step estimators: van der Vaart, Asymptotic Sta
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,7 +90,7 @@ class OneStep:
         model: LinearModel,
         trim: Trim,
         changed: Sequence[Maneuver],
-        extended: Sequence[LinearModel],
+        extended: Sequence[tuple[LinearModel, Sequence[Maneuver]]],
         prior_sd: Sequence[float] = (),
     ) -> Step:
         """Return the step for a new model and data, and further parameters estimated along.
@@ -101,8 +101,8 @@ class OneStep:
             With the further parameters at zero.
         trim : Trim
         changed : sequence of Maneuver
-        extended : sequence of LinearModel
-            The model with each of them at one; the residuals must be linear in them.
+        extended : sequence of (LinearModel, sequence of Maneuver)
+            Model and data with each of them at one; the residuals must be linear in them.
         prior_sd : sequence of float
             Of each, about zero.
         """
@@ -112,7 +112,7 @@ class OneStep:
         if here is None:
             shares = np.zeros((len(changed), self.length))
             return Step(shares, np.zeros(count), np.zeros((count, count)), none)
-        beside = [self.residuals(one, trim, changed) for one in extended]
+        beside = [self.residuals(one, trim, data) for one, data in extended]
         score = np.zeros((len(changed), len(self.inverse)))
         link = np.zeros((len(changed), len(self.inverse), count))
         normal, right = np.diag(np.asarray(prior_sd, dtype=np.float64) ** -2.0), np.zeros(count)
@@ -152,13 +152,18 @@ class OneStep:
         return result
 
 
-def one_step_of(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim) -> OneStep | None:
-    """Return the step of the method that made a result; None if it has none, or fails there."""
+def one_step_of(
+    result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim, loose: Collection[str] = ()
+) -> OneStep | None:
+    """Return the step of the method that made a result; None if it has none, or fails there.
+
+    Unknowns of output error that sit on a bound stay there, but for those that are `loose`.
+    """
     if result.residual_kind == "innovation":
         noise = any(n.startswith(PROCESS) for n in result.names)
         # A filter whose noise is no parameter of it, as Kalman filters with joint states, has none.
         return _of_innovations(result, maneuvers, trim) if noise else None
-    return _of_outputs(result, maneuvers)
+    return _of_outputs(result, maneuvers, loose)
 
 
 def _of_innovations(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim) -> OneStep | None:
@@ -192,7 +197,9 @@ def _whitened(residuals: Sequence[Array], found: Innovations) -> list[Array]:
     return [found.whiten(k, e).ravel() for k, e in enumerate(residuals)]
 
 
-def _of_outputs(result: FitResult, maneuvers: Sequence[Maneuver]) -> OneStep | None:
+def _of_outputs(
+    result: FitResult, maneuvers: Sequence[Maneuver], loose: Collection[str]
+) -> OneStep | None:
     problem = output_problem(result.model, maneuvers)
     theta = problem.first_guess()
     place = {n: k for k, n in enumerate(result.names)}
@@ -215,6 +222,7 @@ def _of_outputs(result: FitResult, maneuvers: Sequence[Maneuver]) -> OneStep | N
         H[np.ix_(own, own)] += J.T @ J
     if not np.isfinite(H).all():
         return None
+    on_bound = (theta <= problem.lower) | (theta >= problem.upper)
 
     def residuals(model: LinearModel, _: Trim, data: Sequence[Maneuver]) -> list[Array] | None:
         other = output_problem(model, data)
@@ -228,7 +236,7 @@ def _of_outputs(result: FitResult, maneuvers: Sequence[Maneuver]) -> OneStep | N
         reference=[-(weight[:, None] * e).ravel() for e in left],
         slopes=slopes,
         columns=[problem.columns(k) for k in range(len(slopes))],
-        inverse=_inverse_within(H, (theta <= problem.lower) | (theta >= problem.upper)),
+        inverse=_inverse_within(H, on_bound & ~np.isin(problem.names, list(loose))),
         source=np.array([k for k, _ in known], dtype=np.int64),
         target=np.array([k for _, k in known], dtype=np.int64),
         length=len(result.names),

@@ -31,11 +31,12 @@ from host.sysid.compatibility.sensor_corrections import (
 from host.sysid.compatibility.sensor_dynamics import columns_at_cg
 from host.sysid.flight.column_sampling import sampled_name
 from host.sysid.flight.data_finding import Finding
-from host.sysid.flight.input_kinks import with_means_of_motion, with_means_of_smooth_motion
+from host.sysid.flight.input_kinks import with_means_of_motion
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
+from host.sysid.numerics.between_samples import with_means_of_smooth_motion
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -207,7 +207,8 @@ def correct_trim_departure(
         replace(m, inputs=varying.maneuver(c, m.dt_s).inputs)
         for m, c in zip(maneuvers, cuts, strict=True)
     ]
-    found = one_step.joint(straight, trim, data, curved, list(curvature.values()))
+    beside = [(model, data) for model in curved]
+    found = one_step.joint(straight, trim, data, beside, list(curvature.values()))
     if not np.isfinite(found.shares).all():
         return None
     step = found.shares.sum(axis=0)
