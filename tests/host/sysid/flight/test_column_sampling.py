@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from host.sysid.estimators.filter_error_gust import SLOW_IN_CALM
 from host.sysid.flight.column_sampling import quantum, sampling_of
 from host.sysid.flight.flight_tables import read_flight_columns
 from host.sysid.models.maneuver import Maneuver
@@ -181,6 +182,15 @@ def test_a_slow_column_leaves_the_gust_filter() -> None:
     answer = host.identify(held(record(0)), models="longitudinal", stretches=[(4.0, 39.0)])
     assert answer.linear[0].method == "filter-error-gust"
     assert answer.linear[0].result.residual_kind == "innovation"
+
+
+def test_in_calm_air_output_error_tells_delays_by_slow_columns() -> None:
+    """By the filter the gyro's delay scattered twice as far as it was known."""
+    slow = SPOILT["all held"](record(0))
+    [answer] = host.identify(slow, models="longitudinal", stretches=[(4.0, 39.0)]).linear
+    assert answer.result.residual_kind == "output"
+    assert SLOW_IN_CALM in answer.result.warnings
+    assert {"delay_vanes_s", "delay_imu_s"} <= set(answer.result.names)
 
 
 def test_without_a_compiler_output_error_stands_in(monkeypatch: pytest.MonkeyPatch) -> None:

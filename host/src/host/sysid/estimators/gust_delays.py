@@ -120,15 +120,24 @@ def estimate_delays(
         delays = {d.name: (0.0, float(half[first.index(d.name)])) for d in groups}
         return DelayEstimate(delays, estimate, _added_covariance(first, list(values), count))
     found = _as_known_before(found, by_prior)
-    widened = _with_hold_error(found, groups, HOLD_SHARE * dt_s)
+    steps_s = {d.name: sampling_step_s(d, model, maneuvers) for d in groups}
+    widened = _with_hold_error(found, groups, {n: HOLD_SHARE * s for n, s in steps_s.items()})
     half = NORMAL_95 * widened.standard_error
     gust_mps = gust_deviation_mps(found, airspeed_mps)
-    counted = HOLD_SHARE * dt_s * gust_mps / float(np.hypot(gust_mps, CALM_MPS))
+    share = HOLD_SHARE * gust_mps / float(np.hypot(gust_mps, CALM_MPS))
+    counted = _with_hold_error(found, groups, {n: share * s for n, s in steps_s.items()})
     return DelayEstimate(
         {n: (v, float(half[widened.index(n)])) for n, v in values.items()},
         estimate,
-        _added_covariance(_with_hold_error(found, groups, counted), list(values), count),
+        _added_covariance(counted, list(values), count),
     )
+
+
+def sampling_step_s(delay: DelayGroup, model: LinearModel, maneuvers: Sequence[Maneuver]) -> float:
+    """Return the mean step at which the quickest output of a delay was measured, s."""
+    columns = [model.outputs.index(y) for y in delay.outputs if y in model.outputs]
+    quickest = [np.max(np.mean(m.seen[:, columns], axis=0), initial=0.0) for m in maneuvers]
+    return max(m.dt_s / max(float(q), 1e-3) for m, q in zip(maneuvers, quickest, strict=True))
 
 
 def advance_outputs(
@@ -207,7 +216,9 @@ def _with_delay_terms(
     by_state, by_input = np.zeros_like(wider_C), C @ B
     by_state[:, :n] = C @ A
     gust = np.array([name.startswith(PREFIX) for name in wide.states])
-    by_state[np.ix_(np.any(C[:, gust] != 0.0, axis=1), np.append(gust, [False] * (size - n)))] = 0.0
+    by_state[
+        np.ix_(np.any(C[:, gust] != 0.0, axis=1), np.append(gust, np.zeros(size - n, dtype=bool)))
+    ] = 0.0
     late = {wide.outputs.index(y) for _, y in vanes}
     terms = [
         replace(t, gain=-t.gain) if t.matrix == "C" and t.row in late else t for t in wide.terms
@@ -296,7 +307,9 @@ def _as_delays(found: FitResult, groups: Sequence[DelayGroup], dt_s: float) -> F
     return replace(found, estimate=estimate, covariance=found.covariance * np.outer(by, by))
 
 
-def _with_hold_error(found: FitResult, groups: Sequence[DelayGroup], sd_s: float) -> FitResult:
+def _with_hold_error(
+    found: FitResult, groups: Sequence[DelayGroup], sd_s: Mapping[str, float]
+) -> FitResult:
     """Return the fit with what passes for a delay of the inertial sensors, parameters moving along.
 
     Vanes are compared with them: what shifts both is no delay between.
@@ -306,7 +319,7 @@ def _with_hold_error(found: FitResult, groups: Sequence[DelayGroup], sd_s: float
         k = found.index(delay.name)
         if not _late_by_pade(delay) and covariance[k, k] > 0.0:
             by = covariance[:, k] / covariance[k, k]
-            covariance += sd_s**2 * np.outer(by, by)
+            covariance += sd_s[delay.name] ** 2 * np.outer(by, by)
     return replace(found, covariance=covariance)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.estimators.filter_error import near_its_optimum
-from host.sysid.estimators.filter_error_gust import fit_with_gust
+from host.sysid.estimators.filter_error_gust import SLOW_IN_CALM, fit_with_gust
 from host.sysid.estimators.gust_delays import advance_outputs
 from host.sysid.estimators.gust_model import VANES
 from host.sysid.estimators.method_registry import fit
@@ -25,7 +25,7 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver, measurements
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.intermittent_filter import needs_compiler, unidentifiable_delays
+from host.sysid.numerics.intermittent_filter import needs_compiler
 
 GUST, FILTER = "filter-error-gust", "filter-error"
 MEMORY, WHITE = "output-error", "output-error-white"
@@ -98,7 +98,7 @@ def fit_by_evidence(
 
     The Bayesian information criterion is -2 ln L + k ln N with k unknowns and N samples (Schwarz,
     Annals of Statistics 6, 1978). Where no output's noise has a memory nothing is left for moving
-    air to explain, and no filter is tried.
+    air to explain, and no filter is tried; of a slow sensor it cannot be seen.
 
     Parameters
     ----------
@@ -115,7 +115,8 @@ def fit_by_evidence(
     orders = np.asarray(plain.result.details["noise_orders"])
     coloured = bool(np.any(orders))
     own = "noise with a memory" if coloured else "white noise"
-    if memory and not coloured:
+    seen = not any(m.held for m in maneuvers)  # a memory, between values of a slow sensor
+    if memory and seen and not coloured:
         named = replace(plain.result, method="output error (white)")
         line = "noise chosen by the data: white, it has no memory"
         return UsersFit(WHITE, named, plain.maneuvers, remarks=(line,))
@@ -142,7 +143,7 @@ def fit_by_evidence(
 
 def no_filter(model: LinearModel, maneuvers: Sequence[Maneuver]) -> str:
     """Return why no Kalman filter fits this model to these data; empty where one does."""
-    why = needs_compiler(maneuvers) or unidentifiable_delays(model, maneuvers)
+    why = needs_compiler(maneuvers)
     if why:
         return why
     if model.known_noise:
@@ -186,8 +187,9 @@ def _gust_fit(
     known = before if before.residual_kind == "innovation" else None
     found = fit_with_gust(model, maneuvers, airspeed_mps, known)
     if found.result.residual_kind != "innovation":
+        why = "the air is calm" if SLOW_IN_CALM in found.result.warnings else "it does not converge"
         raise IdentificationError(
-            f"{GUST} does not converge on {model.name}; {FILTER} and {MEMORY} are there"
+            f"{GUST} cannot fit {model.name}: {why}; {FILTER} and {MEMORY} are there"
         )
     return UsersFit(GUST, found.result, found.maneuvers, found.delays)
 

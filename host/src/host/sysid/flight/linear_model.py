@@ -25,7 +25,7 @@ from host.sysid.models.state_space_model import (
     without_outputs,
 )
 from host.sysid.models.templates import TEMPLATES, Trim, template
-from host.sysid.numerics.intermittent_filter import needs_compiler, unidentifiable_delays
+from host.sysid.numerics.intermittent_filter import needs_compiler
 
 AXIS_OF = {
     "longitudinal": ("elevator_rad",),
@@ -116,7 +116,7 @@ def _default_method(
     if not (trim.known and vane in model.states and vane in model.outputs):
         return "output-error-white", ""
     data = [m.cut(model) for m in used]
-    why = needs_compiler(data) or unidentifiable_delays(model, data) or no_filter_step(used, model)
+    why = needs_compiler(data) or no_filter_step(used, model)
     return ("output-error-white", f"{why}; output error stands instead") if why else (GUST, "")
 
 

@@ -20,7 +20,6 @@ from host.arrays import Array, BoolArray
 from host.compiled import compiled, compiled_part, has_compiler
 from host.extras import install_hint
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.recursion import STATE_LIMIT
 
 SAMPLES_WITHOUT_COMPILER = 500  # of a filter that Python runs in minutes
@@ -166,16 +165,6 @@ def needs_compiler(maneuvers: Sequence[Maneuver]) -> str:
     return (
         f"a filter of columns with missing rows takes hours without numba: {install_hint('numba')}"
     )
-
-
-def unidentifiable_delays(model: LinearModel, maneuvers: Sequence[Maneuver]) -> str:
-    """Return why such a filter cannot tell the delays of a model; empty where it can.
-
-    With every column held for five rows, in gusts, the IMU seemed up to 2 ms late and M_q of four
-    flights was 2 to 10 % small; in calm air M_alpha was 2.6 standard errors off in two of three.
-    """
-    quick = all(m.seen.all(axis=0).any() for m in maneuvers)
-    return "" if quick or not model.delays else "no column is quick enough to tell the delays"
 
 
 @compiled_part
