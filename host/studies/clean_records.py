@@ -62,7 +62,8 @@ def moved(kind: str, t: Array, dt_s: float, rng: np.random.Generator) -> Array:
     if kind.startswith("smooth"):
         quick, slow = rng.uniform(2.0, 6.0), rng.uniform(0.5, 2.0)
         begins = np.minimum(t / 0.3, 1.0) ** 2
-        return AMPLITUDE_RAD * begins * np.sin(quick * t) * np.sin(slow * t + rng.uniform(0.0, 3.0))
+        wave = np.sin(quick * t) * np.sin(slow * t + rng.uniform(0.0, 3.0))
+        return np.asarray(AMPLITUDE_RAD * begins * wave)
     u, at_s, unit_s = np.zeros_like(t), 0.3 + rng.uniform(0.0, dt_s), rng.uniform(0.15, 0.35)
     for length, sign in ((3, 1), (2, -1), (1, 1), (1, -1)):
         u[(t >= at_s) & (t < at_s + length * unit_s)] = sign * AMPLITUDE_RAD

@@ -24,6 +24,7 @@ from host.sysid.flight.one_step import OneStep, Step, one_step_of
 from host.sysid.flight.reconstructed_flight import FlownManeuver
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
 from host.sysid.numerics.between_samples import (
     OTHER_HOLD,
@@ -88,16 +89,15 @@ def _bends_and_jumps(
     the odds that there were any.
     """
     model, wider = result.model, found.widened_in(result)
-    smooth = [
+    smooth: list[tuple[LinearModel, Sequence[Maneuver]]] = [
         (replace(model, hold=OTHER_HOLD[model.hold]), maneuvers),
         (model, with_bent_controls(model, maneuvers)),
     ]
-    jumping = [
-        (model, with_jump(maneuvers, jump, model.hold)) for jump in likely_jumps(model, maneuvers)
-    ]
-    prior_sd = np.array([1.0, 1.0, *(EVENLY_SD for _ in jumping)])
+    jumps = likely_jumps(model, maneuvers)
+    jumping = [*smooth, *((model, with_jump(maneuvers, j, model.hold)) for j in jumps)]
+    prior_sd = np.array([1.0, 1.0, *(EVENLY_SD for _ in jumps)])
     bent = found.joint(model, trim, maneuvers, smooth, list(prior_sd[:2] / wider))
-    jumped = found.joint(model, trim, maneuvers, smooth + jumping, list(prior_sd / wider))
+    jumped = found.joint(model, trim, maneuvers, jumping, list(prior_sd / wider))
     odds = _log_odds(jumped, prior_sd, wider) - _log_odds(bent, prior_sd[:2], wider)
     return np.vstack(
         [
