@@ -120,7 +120,7 @@ def rows_of(seed: int) -> Iterator[dict[str, object]]:
 
 def table(rows: Sequence[dict[str, str]]) -> list[str]:
     """Return a line for each input, and for all: how many hold, and how wide intervals are."""
-    lines = ["input           records  estimates  hold  half-width over value, median %  M's"]
+    lines = ["input           records  estimates  hold  half-width over value, median %    M's"]
     for kind in (*INPUTS, "all"):
         some = [r for r in rows if kind in (r["input"], "all")]
         if not some:
@@ -131,7 +131,7 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
         held = int(np.sum(np.abs(estimate - true) <= half))
         lines.append(
             f"{kind:14s}{len({r['seed'] for r in some}):9d}{len(some):11d}{held:6d}"
-            f"{np.median(wide):33.2f}{np.median(wide[moments]):5.2f}"
+            f"{np.median(wide):33.2f}{np.median(wide[moments]):7.2f}"
         )
     return lines
 
