@@ -187,10 +187,9 @@ def _gust_fit(
     known = before if before.residual_kind == "innovation" else None
     found = fit_with_gust(model, maneuvers, airspeed_mps, known)
     if found.result.residual_kind != "innovation":
-        why = "the air is calm" if SLOW_IN_CALM in found.result.warnings else "it does not converge"
-        raise IdentificationError(
-            f"{GUST} cannot fit {model.name}: {why}; {FILTER} and {MEMORY} are there"
-        )
+        calm = SLOW_IN_CALM in found.result.warnings
+        why = "finds calm air and slow columns in" if calm else "does not converge on"
+        raise IdentificationError(f"{GUST} {why} {model.name}; {FILTER} and {MEMORY} are there")
     return UsersFit(GUST, found.result, found.maneuvers, found.delays)
 
 
