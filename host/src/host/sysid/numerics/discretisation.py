@@ -102,8 +102,10 @@ def powers_of(M: Array, highest: int) -> Array:
     powers = np.empty((highest + 1, *M.shape))
     powers[0], powers[1] = np.eye(len(M)), M
     known = 1
-    while known < highest:
-        more = min(known, highest - known)
-        np.matmul(powers[known], powers[1 : more + 1], out=powers[known + 1 : known + more + 1])
-        known += more
+    # As above: of an unstable trial high powers overflow.
+    with np.errstate(over="ignore", invalid="ignore"):
+        while known < highest:
+            more = min(known, highest - known)
+            np.matmul(powers[known], powers[1 : more + 1], out=powers[known + 1 : known + more + 1])
+            known += more
     return powers
