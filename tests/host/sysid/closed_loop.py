@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from host.arrays import Array
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim, template
+from numpy.random import Generator
 from studies.wrong_flights import NOISE_SD, TRUTH
 
 DT_S, FINE = 0.02, 4
@@ -61,8 +63,16 @@ def flown(
         given[:, model.inputs.index(law.surface)] += own[::FINE]
     states = x[:-1:FINE].copy()
     states[:, vane] += gust[::FINE]
+    return _recorded(model, (C, D), states, given, rng)
+
+
+def _recorded(
+    model: LinearModel, CD: tuple[Array, Array], states: Array, given: Array, rng: Generator
+) -> dict[str, Array]:
+    """Return the columns that noisy sensors make of states and inputs."""
     noise = np.array([NOISE_SD[o] for o in model.outputs])
-    y = states @ C.T + given @ D.T + noise * rng.standard_normal((len(states), len(C)))
+    y = states @ CD[0].T + given @ CD[1].T
+    y += noise * rng.standard_normal(y.shape)
     steady = {"airspeed_mps": 17.0, "alpha_rad": 0.06, "theta_rad": 0.06, "ax_mps2": 0.0}
     columns = {"t_s": DT_S * np.arange(len(y))}
     columns |= {k: np.full(len(y), v) for k, v in steady.items()}
@@ -77,3 +87,41 @@ def doublets(samples: int, starts: tuple[int, ...], side_s: float, size_rad: flo
         u[start : start + side] = size_rad
         u[start + side : start + 2 * side] = -size_rad
     return u
+
+
+def tracked(seed: int, leg_s: float, duration_s: float = 64.0) -> dict[str, Array]:
+    """Return the columns of a lateral flight that holds headings, a new one each leg.
+
+    aileron = 0.5 (bank wanted - bank) - 0.06 p, 40 ms late; bank wanted is 0.6 of the error of the
+    heading, at most 0.5. The rudder flies doublets. No column has the heading; the gyro about z has
+    a bias of 0.2 deg/s.
+    """
+    rng = np.random.default_rng(seed)
+    model = template("lateral", Trim(17.0, 0.06, 0.06))
+    A, B, C, D = model.matrices(np.array([TRUTH["lateral"][p.name] for p in model.parameters]))
+    at = {name: k for k, name in enumerate((*model.states, *model.inputs))}
+    beta, p, r, phi = (at[name] for name in ("beta_rad", "p_radps", "r_radps", "phi_rad"))
+    samples, dt = round(duration_s / DT_S), DT_S / FINE
+    rudder = doublets(samples, tuple(range(100, samples - 60, 350)), 0.3, 0.1)
+    turns = rng.uniform(-1.2, 1.2, int(duration_s / leg_s) + 1)
+    wanted = np.repeat(np.cumsum(turns), round(leg_s / DT_S))[:samples]
+    states, inputs = np.zeros((samples, len(A))), np.zeros((samples, len(model.inputs)))
+    x, heading, gust, late = np.zeros(len(A)), 0.0, 0.0, round(0.04 / dt)
+    past: list[tuple[float, float, float]] = []
+    for k in range(samples * FINE):
+        row = k // FINE
+        past.append((x[phi], x[p], heading))
+        bank, roll_rate, then = past[max(0, k - late)]
+        inner = float(np.clip(0.6 * (wanted[row] - then), -0.5, 0.5))
+        u = np.zeros(len(model.inputs))
+        u[model.inputs.index("aileron_rad")] = 0.5 * (inner - bank) - 0.06 * roll_rate
+        u[model.inputs.index("rudder_rad")] = rudder[row]
+        if k % FINE == 0:
+            states[row], inputs[row] = x, u
+            states[row, beta] += gust
+        gust += -gust * dt / GUST_S + GUST_RAD * np.sqrt(2.0 * dt / GUST_S) * rng.standard_normal()
+        heading += dt * x[r]
+        x = x + dt * (A @ x + B @ u + A[:, beta] * gust)
+    columns = _recorded(model, (C, D), states, inputs, rng)
+    gyro_bias = np.radians(0.2)
+    return columns | {"q_radps": np.zeros(samples), "r_radps": columns["r_radps"] + gyro_bias}

@@ -24,7 +24,7 @@ from host.sysid.flight.maneuver_selection import select_maneuvers
 from studies.wrong_flights import fly
 
 from tests.host.logs import ROOT
-from tests.host.sysid.closed_loop import DT_S, Law, doublets, flown
+from tests.host.sysid.closed_loop import DT_S, Law, doublets, flown, tracked
 
 SAMPLES = 1600
 STARTS = (100, 400, 700, 1000, 1300)
@@ -98,6 +98,18 @@ def test_a_bank_loop_whose_command_jumps_is_named_and_takes_nothing(seed: int) -
     # The same steps by a pilot, small enough for a flight without a law.
     inputs["aileron_rad"] = 0.1 * steps
     assert found_in(flown("lateral", inputs, None, seed)) == []
+
+
+@pytest.mark.parametrize("seed", [19500, 19502])
+def test_a_tracker_is_named_where_heading_is_no_column(seed: int) -> None:
+    """The rates tell it, but for a drift; without them bank alone is no law."""
+    columns = tracked(seed, leg_s=12.0)
+    [found] = found_in(columns)
+    assert "psi_rad" in found.text.split(" at ")[0]
+    assert found.text.endswith(" legs of constant command, heading by rates")
+    assert found.feedback is None
+    del columns["theta_rad"]
+    assert found_in(columns) == []
 
 
 @pytest.mark.parametrize("side_s", [0.3, 0.8])

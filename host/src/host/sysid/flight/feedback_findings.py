@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from host.arrays import Array, IntArray
 from host.sysid.flight.data_finding import Feedback, Finding
@@ -33,6 +34,7 @@ HOLDING = {
 }  # fmt: skip
 # What a waypoint tracker's bank loop follows in every leg, and what in some.
 BANK_LOOP, HEADING = ("p_radps", "phi_rad"), "psi_rad"
+TURNING = ("q_radps", "r_radps", "phi_rad", "theta_rad")  # tell how heading changes
 MOMENT = {"elevator_rad": "M", "aileron_rad": "L", "rudder_rad": "N"}
 LABEL = {
     "elevator_rad": "de", "aileron_rad": "da", "rudder_rad": "dr", "airspeed_mps": "V",
@@ -142,7 +144,7 @@ def _tracker(
         return None, ""
     dt_s, moved = _period_s(columns), columns["aileron_rad"]
     signals = {n: columns[n] for n in BANK_LOOP}
-    inner, heading = np.column_stack(list(signals.values())), columns.get(HEADING)
+    inner, heading = np.column_stack(list(signals.values())), _heading(columns)
     legs, followed = feedback_legs(dt_s, moved, inner, heading, windows)
     if followed is not None:
         signals[HEADING] = followed
@@ -152,7 +154,17 @@ def _tracker(
     gains = zip(law.signals, law.gains, strict=True)
     if any(HOLDING["aileron_rad", name] * gain < 0.0 for name, gain in gains):
         return None, ""
-    return law, f" within {len(legs)} legs of constant command"
+    by_rates = ", heading by rates" if HEADING in law.signals and HEADING not in columns else ""
+    return law, f" within {len(legs)} legs of constant command{by_rates}"
+
+
+def _heading(columns: Mapping[str, Array]) -> Array | None:
+    """Return heading; where no column has it, by rates: its drift is little within a leg."""
+    if HEADING in columns or any(name not in columns for name in TURNING):
+        return columns.get(HEADING)
+    q, r, phi, theta = (columns[name] for name in TURNING)
+    rate = (q * np.sin(phi) + r * np.cos(phi)) / np.cos(theta)
+    return np.asarray(cumulative_trapezoid(rate, dx=_period_s(columns), initial=0))
 
 
 def _period_s(columns: Mapping[str, Array]) -> float:
