@@ -56,8 +56,9 @@ def add_data_choices(parser: argparse.ArgumentParser) -> None:
                         help="use only maneuver N of `host maneuvers`; repeatable")  # fmt: skip
     parser.add_argument("--no-corrections", action="store_true",
                         help="leave the sensor errors that were estimated in the data")  # fmt: skip
-    parser.add_argument("--accept", action="append", metavar="CHECK", help="use columns as they are"
-                        " whatever this check of the data finds; repeatable")  # fmt: skip
+    parser.add_argument("--accept", action="append", metavar="CHECK",
+                        help="use columns as they are whatever this check of the data finds ('list'"
+                        " shows them); repeatable")  # fmt: skip
     add_row_rate(parser)
     add_sensor(parser)
 

@@ -122,19 +122,11 @@ def _run(args: argparse.Namespace) -> int:
     from host.readers.autopilot_flight import chosen_sensors
     from host.sysid.answer.output_files import check_outputs
     from host.sysid.estimators.method_options import read_options
-    from host.sysid.flight.shipped_maps import LIST, map_lines
     from host.sysid.pipeline.arguments import option_words
-    from host.sysid.pipeline.requested_models import known_methods, model_lines
     from host.sysid.pipeline.stages import identify
 
-    if "list" in (args.method or ()):
-        print("\n".join(f"{name:26s} {about}" for name, about in known_methods().items()))
-        return int(ExitCode.OK)
-    if "list" in (args.model or ()):
-        print("\n".join(model_lines()))
-        return int(ExitCode.OK)
-    if LIST in [str(path) for _, path in args.map]:
-        print("\n".join(map_lines()))
+    if lines := _asked_for(args):
+        print("\n".join(lines))
         return int(ExitCode.OK)
     args.source = args.source or [source_or_newest(None)]
     places = _places(args)
@@ -171,6 +163,21 @@ def _run(args: argparse.Namespace) -> int:
         print(text)  # the answer is not lost with its file
     _say(written)
     return int(ExitCode.OK)
+
+
+def _asked_for(args: argparse.Namespace) -> list[str]:
+    """Return what 'list' in place of a name shows; nothing where no list is asked for."""
+    from host.sysid.flight.data_finding import check_lines
+    from host.sysid.flight.shipped_maps import LIST, map_lines
+    from host.sysid.pipeline.requested_models import known_methods, model_lines
+
+    if LIST in (args.method or ()):
+        return [f"{name:26s} {about}" for name, about in known_methods().items()]
+    if LIST in (args.model or ()):
+        return model_lines()
+    if LIST in [str(path) for _, path in args.map]:
+        return map_lines()
+    return check_lines() if LIST in (args.accept or ()) else []
 
 
 def _places(args: argparse.Namespace) -> OutputPaths:

@@ -51,6 +51,7 @@ def run(args: argparse.Namespace) -> int:
     from host.errors import ExitCode
     from host.readers.autopilot_flight import chosen_sensors
     from host.sysid.answer.output_files import OutputPaths, check_outputs
+    from host.sysid.flight.data_finding import check_lines
     from host.sysid.flight.shipped_maps import LIST, map_lines
     from host.sysid.identification_error import IdentificationError
     from host.sysid.pipeline.arguments import option_words
@@ -58,6 +59,9 @@ def run(args: argparse.Namespace) -> int:
 
     if LIST in [str(one[-1]) for one in args.map]:
         print("\n".join(map_lines()))
+        return int(ExitCode.OK)
+    if LIST in (args.accept or ()):
+        print("\n".join(check_lines()))
         return int(ExitCode.OK)
     try:
         if not args.source:

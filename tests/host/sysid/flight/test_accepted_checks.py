@@ -171,3 +171,10 @@ def test_throttle_in_per_cent_hides_no_surface(record: pd.DataFrame, tmp_path: P
     times("throttle", 100.0)(record).to_csv(tmp_path / "x.csv", index=False)
     found = identified(tmp_path / "x.csv", "--model", "short-period", "--accept", "throttle")
     assert found["answers"]
+
+
+@pytest.mark.parametrize("verb", ["identify", "predict"])
+def test_all_checks_are_listed(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([verb, "--accept", "list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert {line.split()[0]: " ".join(line.split()[1:]) for line in lines} == CHECKS

@@ -148,6 +148,11 @@ def finding_document(finding: Finding) -> dict[str, Any]:
     }
 
 
+def check_lines() -> list[str]:
+    """Return what `--accept list` prints: every check, and what holds where it finds nothing."""
+    return [f"{name:26s} {right}" for name, right in CHECKS.items()]
+
+
 def accepted_in_vain(accept: Collection[str], findings: Sequence[Finding]) -> list[str]:
     """Return a note on each accepted check that found nothing."""
     found = {f.check for f in findings}
