@@ -19,12 +19,16 @@ KNOWN = {"Z_alpha": -8.0, "M_alpha": -60.0, "M_q": -8.0, "M_de": -70.0, "Z_de": 
 KNOWN |= {"D_V": -0.2, "D_alpha": -5.0, "Z_V": -0.07, "imu_x_m": 0.02, "imu_z_m": -0.01}
 
 
-def gusty_aircraft() -> LinearModel:
-    """Return an aircraft with accelerometers on arms, biases and a gust."""
+def aircraft() -> LinearModel:
+    """Return an aircraft with accelerometers on arms and biases."""
     trim = Trim(17.0, 0.05, 0.05)
     base = template("longitudinal", trim, accelerometers=True, delays=(), imu_sd_m=0.02)
-    base = base.with_start([KNOWN.get(p.name, 0.0) for p in base.parameters])
-    return gust_model(base, 17.0)
+    return base.with_start([KNOWN.get(p.name, 0.0) for p in base.parameters])
+
+
+def gusty_aircraft() -> LinearModel:
+    """Return the same with a gust."""
+    return gust_model(aircraft(), 17.0)
 
 
 def flown(model: LinearModel, seeds: tuple[int, ...]) -> list[Maneuver]:
@@ -58,6 +62,23 @@ def known(point: InnovationLikelihood | None) -> InnovationLikelihood:
     """Return a point that must be there."""
     assert point is not None
     return point
+
+
+def test_gradient_is_that_of_differences_where_a_gust_dies_away_within_a_sample() -> None:
+    """Slopes of its process noise were rounding, times 1e38."""
+    model = gust_model(aircraft(), 17.0, scale_m=0.01)
+    problem = FilterProblem(model, flown(model, (1,)), ("gust_rad", "airspeed_mps"))
+    theta = vector(problem)
+    here = known(problem.evaluate(theta))
+    information, gradient = total_information(
+        problem.output_problem, theta, *fisher_scoring(problem, theta, here)
+    )
+    for name in ("Z_alpha", "M_q", "log_process.gust_rad"):
+        k, width = problem.names.index(name), np.zeros(len(theta))
+        width[k] = 1e-3 / np.sqrt(information[k, k])
+        up, down = (known(problem.evaluate(theta + s * width)) for s in (1.0, -1.0))
+        slope = (down.cost - up.cost) / (2.0 * width[k])
+        assert gradient[k] == pytest.approx(slope, rel=1e-3), name
 
 
 def test_gradient_and_information_are_those_of_differences() -> None:
