@@ -46,13 +46,12 @@ def checked(
         reading, left = found
         result = reading.read(result)
         remain = {(f.check, f.channels) for f in left}
-        times = f" (times {reading.gain:.4g})" if abs(reading.gain) != 1.0 else ""
         for f in asked:
             if (f.check, f.channels) not in remain:
                 settled.append(
                     replace(
                         f,
-                        done=f"read as {reading.words}{times}",
+                        done=reading.line,
                         wrong_unit=f.wrong_unit or not reading.weight,
                     )
                 )

@@ -5,13 +5,13 @@ and the specific force. Each column that moves one of them must do so with a fac
 on either side only widens the range of factors that a regression allows, from both directions;
 what lies outside as a whole is a unit, a scale, a sign or another clock. Of speed against forward
 force it may as well be thrust that a sensor does not feel, wind that changes with height, or a slow
-pitot. Gusts change the speed as no force says: an accelerometer alone in g may hide in them.
+pitot. Gusts change angles and speed as no force says; what surfaces drive is judged apart.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -19,9 +19,22 @@ from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.sysid.flight.column_map import UNITS
 from host.sysid.flight.data_finding import HINT, Finding
+from host.sysid.flight.driven_motion import (
+    DrivenFactor,
+    driven_factors,
+    driven_misfit,
+    shared_factor,
+)
+from host.sysid.flight.identity_factors import (
+    LARGEST_FACTOR,
+    SIGN_CORRELATION,
+    Factor,
+    Identity,
+    correlation,
+    factors,
+    without,
+)
 
-SIGN_CORRELATION, FACTOR_CORRELATION = 0.5, 0.25  # partial: less tells nothing of either
-LARGEST_FACTOR = 1.5
 UNIT_MARGIN = 1.1  # about the range of factors: a unit's outside it is none
 MOTION_SHARE = 0.3  # of what a law leaves: with less it is noise
 ANGLE_EXPLAINED = 0.3  # of an angle's rate that the gyro explains: less is another signal
@@ -29,6 +42,11 @@ WIND_ANGLE_EXPLAINED = 0.05  # the same of a wind angle, which gusts turn too
 QUIET_RADPS = 0.02  # noise of a still sensor follows nothing
 BLOCK_S, SLOW_S = 0.1, 0.5  # slopes are those of means over this long; slow: pitot and GPS
 FEWEST = 32  # means
+ALONG, ACROSS = ("elevator_rad",), ("aileron_rad", "rudder_rad")  # what drives which
+DRIVING_RAD = 0.05  # a surface that swings less is a hand that answers, not a test input
+# Right sensors: tilt of an IMU, zero of a vane, delay of a pitot, one deviation each; and thrust
+# that a forward force does not feel, at full throttle.
+TILT_RAD, ZERO_RAD, PITOT_DELAY_S, THRUST_MPS2 = 0.03, 0.05, 0.3, 10.0
 UNIT_OF_FORCE = 5.0  # speed against force: thrust, wind and a slow pitot stay below, g is 9.8
 # What is compared, by the column that changes and what it is held against.
 CHECK_OF = {
@@ -39,6 +57,7 @@ CHECK_OF = {
     ("beta_rad", "r_radps"): "beta-against-r",
     ("alpha_rad", "az_mps2 over airspeed_mps"): "alpha-against-az",
     ("beta_rad", "ay_mps2 over airspeed_mps"): "beta-against-ay",
+    ("beta_rad", "ay_mps2"): "beta-against-ay",
     ("airspeed_mps", "ax_mps2"): "airspeed-against-ax",
     ("altitude_m", "v_down_mps"): "altitude-against-climb",
 }
@@ -48,54 +67,40 @@ SPEED_CAUSES = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Identity:
-    """How fast one column changes, and what of it each other column must account for."""
-
-    name: str
-    rate: Array
-    parts: dict[str, Array]
-    beside: tuple[Array, ...] = ()
-    explained_share: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Factor:
-    """How many times as fast a column moves as another says: the range that noise leaves."""
-
-    law: Identity
-    name: str
-    low: float
-    high: float
-    certain: bool  # whether the sign is
-
-    @property
-    def off(self) -> float:
-        """How far the slope is from one, as a logarithm; infinite if turned round.
-
-        It is that of noise on the left: a difference of an angle has more of it than a mean rate.
-        """
-        return float(abs(np.log(self.low))) if self.low > 0.0 else np.inf
-
-
-def consistent(flown: Mapping[str, Array], dt_s: float) -> list[Finding]:
+def consistent(flown: Mapping[str, Array], dt_s: float, *, weighed: bool = True) -> list[Finding]:
     """Return a finding for each column that breaks a kinematic identity, or keeps it only scaled.
 
     Parameters
     ----------
     flown : mapping
         SI columns in flight, every `dt_s`.
+    weighed : bool
+        Whether gravity is in the specific forces as it must be: else what surfaces drive of an
+        identity with them tells nothing more.
     """
     findings: list[Finding] = []
-    for law in identities(flown, dt_s):
-        found = _unrelated(law)
-        findings += [found] if found else [x for f in factors(law) if (x := _judge(f)) is not None]
+    laws = list(identities(flown, dt_s))
+    for law in laws:
+        if found := _unrelated(law):
+            if law.opposed > -SIGN_CORRELATION:
+                findings.append(found)
+                continue
+            # Gusts turn this wind angle, where no surface does: no rate says so.
+        else:
+            findings += [one for f in factors(law) if (one := _judge(f)) is not None]
+        findings += map(_judge_driven, driven_factors(law) if weighed else ())
+    if weighed and not any(f.wrong_unit for f in findings):
+        findings += _judge_airspeed(laws)
     return findings
 
 
 def misfit(flown: Mapping[str, Array], dt_s: float) -> float:
-    """Return how far all factors are from one together: what tells units that look alike."""
-    return float(sum(f.off for law in identities(flown, dt_s) for f in factors(law)))
+    """Return how many deviations squared the identities are broken: what tells readings apart."""
+    total = 0.0
+    for law in identities(flown, dt_s):
+        driven = driven_misfit(law)
+        total += sum(f.misfit for f in factors(law)) if driven is None else driven
+    return total
 
 
 def related(flown: Mapping[str, Array], dt_s: float) -> set[tuple[str, str]]:
@@ -124,8 +129,8 @@ def block_means(flown: Mapping[str, Array], block: int) -> dict[str, Array]:
 def _unrelated(law: Identity) -> Finding | None:
     """Return the finding of a column that does not follow its kinematic identity."""
     own = np.column_stack([np.ones(len(law.rate)), *law.beside])
-    rate = _without(law.rate, own)
-    left = _without(law.rate, np.column_stack([own, *law.parts.values()]))
+    rate = without(law.rate, own)
+    left = without(law.rate, np.column_stack([own, *law.parts.values()]))
     noise = _difference_noise(left)
     power, unexplained = float(rate @ rate) - noise, float(left @ left) - noise
     moved = min(float(np.std(law.rate)), max(float(np.std(v)) for v in law.parts.values()))
@@ -150,19 +155,6 @@ def _difference_noise(rate: Array) -> float:
     half of its power. Motion does not.
     """
     return max(-2.0 * float(rate[1:] @ rate[:-1]), 0.0)
-
-
-def factors(law: Identity) -> Iterator[Factor]:
-    """Return the factor of each part that is correlated with an identity, the others apart."""
-    own = np.column_stack([np.ones(len(law.rate)), *law.beside])
-    for name, part in law.parts.items():
-        others = [v for k, v in law.parts.items() if k != name]
-        x, y = (_without(v, np.column_stack([own, *others])) for v in (part, law.rate))
-        xx, yy, xy = float(x @ x), float(y @ y), float(x @ y)
-        if xx < 1e-12 * len(x) or xy**2 < FACTOR_CORRELATION**2 * xx * yy:
-            continue
-        low, high = sorted((xy / xx, yy / xy))  # noise on the left side, noise on the right
-        yield Factor(law, name, low, high, xy**2 >= SIGN_CORRELATION**2 * xx * yy)
 
 
 def _judge(f: Factor) -> Finding | None:
@@ -191,6 +183,34 @@ def _judge(f: Factor) -> Finding | None:
     )
 
 
+def _judge_driven(f: DrivenFactor) -> Finding:
+    """Return the finding of a factor that what surfaces drive tells."""
+    speed = f.law.name == "airspeed_mps"
+    turned = f"{f.law.name} and {f.name} turn opposite ways"
+    times = f"{f.law.name} moves about {f.slope:.2g} times as fast as {f.name} says"
+    return Finding(
+        CHECK_OF[f.law.name, f.name],
+        _channels(f.law.name, f.name),
+        f"{turned if f.slope < 0.0 else times} in what surfaces drive",
+        SPEED_CAUSES if speed else (f"{UNIT}: {HINT}",),
+        wrong_unit=not speed or not 1.0 / UNIT_OF_FORCE < f.slope < UNIT_OF_FORCE,
+    )
+
+
+def _judge_airspeed(laws: Sequence[Identity]) -> list[Finding]:
+    """Return the finding of an airspeed whose unit only lift and side force together tell."""
+    slow = " over airspeed_mps"
+    parts = [(law, name) for law in laws for name in law.parts if name.endswith(slow)]
+    gains = [gain for gain in UNITS["mps"].values() if gain != 1.0]
+    times = shared_factor(parts, [*gains, *(1.0 / gain for gain in gains)])
+    if times is None:
+        return []
+    channels = dict.fromkeys(c for _, name in parts for c in reversed(_channels(name)))
+    text = f"airspeed_mps is about {times:.2g} times what forces make of it in what surfaces drive"
+    causes = (f"{UNIT}: {HINT}", "scales of vanes or airspeed")
+    return [Finding("alpha-against-az", (*channels,), text, causes, wrong_unit=True)]
+
+
 def _factor_causes(f: Factor) -> tuple[str, ...]:
     """Return a unit where one makes such a factor, else scales and the clock."""
     ratios = {
@@ -209,12 +229,6 @@ def _factor_causes(f: Factor) -> tuple[str, ...]:
 def _channels(*names: str) -> tuple[str, ...]:
     """Return the columns behind the names of what is compared."""
     return tuple(part for name in names for part in name.split(" over "))
-
-
-def _without(values: Array, columns: Array) -> Array:
-    size = np.maximum(np.abs(columns).max(axis=0), 1e-12)
-    beta, *_ = np.linalg.lstsq(columns / size, values, rcond=None)
-    return np.asarray(values - (columns / size) @ beta)
 
 
 def _fast(m: Mapping[str, Array]) -> Iterator[Identity]:
@@ -261,15 +275,30 @@ def _wind_angles(
             down = m["az_mps2"] + GRAVITY_MPS2 * np.cos(theta) * np.cos(phi)
             lift = (np.cos(alpha) * down - np.sin(alpha) * along) / speed
             parts = {"q_radps": pitch, "az_mps2 over airspeed_mps": lift}
-            yield _law("alpha_rad", m, parts, explained_share=WIND_ANGLE_EXPLAINED)
+            yield _law(
+                "alpha_rad",
+                m,
+                parts,
+                force=m["az_mps2"],
+                inputs=ALONG,
+                explained_share=WIND_ANGLE_EXPLAINED,
+            )
         else:
             made = (alpha, m.get("elevator_rad", zero))
             yield _law("alpha_rad", m, {"q_radps": pitch}, made)
     if "beta_rad" in m and "r_radps" in m:
         if known and "ay_mps2" in m:
             side = (m["ay_mps2"] + GRAVITY_MPS2 * np.cos(theta) * np.sin(phi)) / speed
-            parts = {"r_radps": yaw, "ay_mps2 over airspeed_mps": side}
-            yield _law("beta_rad", m, parts, explained_share=WIND_ANGLE_EXPLAINED)
+            yield _law(
+                "beta_rad",
+                m,
+                {"r_radps": yaw, "ay_mps2 over airspeed_mps": side},
+                terms={"ay_mps2": m["ay_mps2"] / speed},
+                force=m["ay_mps2"],
+                inputs=ACROSS if "phi_rad" in m else (),  # without bank the weight is missing
+                sensors=(ZERO_RAD * p, TILT_RAD * m.get("az_mps2", zero) / speed),
+                explained_share=WIND_ANGLE_EXPLAINED,
+            )
         else:
             yield _law("beta_rad", m, {"r_radps": yaw}, (beta, phi, m.get("rudder_rad", zero)))
 
@@ -289,7 +318,17 @@ def _slow(m: Mapping[str, Array]) -> Iterator[Identity]:
         tilted = list(factors(_law("airspeed_mps", m, along, lean, known=known)))
         right = bool(tilted) and all(_judge(f) is None for f in tilted)
         if "alpha_rad" in m or not right:
-            yield _law("airspeed_mps", m, along, known=known)
+            weight = GRAVITY_MPS2 * np.cos(theta)
+            sensors = (
+                *(TILT_RAD * force for force in lean),
+                ZERO_RAD * (lean[0] + weight * np.cos(phi)),
+                ZERO_RAD * (lean[1] + weight * np.sin(phi)),
+                THRUST_MPS2 * m.get("throttle", zero),
+            )
+            pitot = {"": PITOT_DELAY_S}
+            yield _law(
+                "airspeed_mps", m, along, known=known, inputs=ALONG, sensors=sensors, delays_s=pitot
+            )
     if "altitude_m" in m and "v_down_mps" in m:
         yield _law("altitude_m", m, {"v_down_mps": -m["v_down_mps"]})
 
@@ -309,6 +348,11 @@ def _law(
     beside: tuple[Array, ...] = (),
     *,
     known: Array | None = None,
+    terms: Mapping[str, Array] = MappingProxyType({}),
+    force: Array | None = None,
+    inputs: tuple[str, ...] = (),
+    sensors: tuple[Array, ...] = (),
+    delays_s: Mapping[str, float] = MappingProxyType({}),
     explained_share: float = 0.0,
 ) -> Identity:
     """Return the identity over each step: a difference on the left, an integral on the right."""
@@ -320,6 +364,17 @@ def _law(
         """Average over a step by the cubic through four points."""
         return np.asarray((13.0 * (x[1:-2] + x[2:-1]) - x[:-3] - x[3:]) / 24.0)[even]
 
-    rate = (np.diff(m[name]) / step_s)[1:-1][even] - (0.0 if known is None else over(known))
-    here = {k: over(v) for k, v in parts.items()}
-    return Identity(name, rate, here, tuple(over(b) for b in beside), explained_share)
+    return Identity(
+        name,
+        (np.diff(m[name]) / step_s)[1:-1][even] - (0.0 if known is None else over(known)),
+        {k: over(v) for k, v in parts.items()},
+        terms={k: over(v) for k, v in terms.items()},
+        beside=tuple(over(b) for b in beside),
+        opposed=0.0 if force is None else correlation(np.diff(over(m[name])), np.diff(over(force))),
+        inputs=tuple(over(m[u]) for u in inputs if u in m and np.ptp(m[u]) > 0.0),
+        driven=any(u in m and np.ptp(m[u]) > DRIVING_RAD for u in inputs),
+        sensors=tuple(over(s) for s in sensors),
+        delays_s=delays_s,
+        step_s=float(np.median(step_s)),
+        explained_share=explained_share,
+    )

@@ -2,15 +2,15 @@
 
 A map that forgot a unit or a sign leaves a column that kinematics contradicts. Every unit that the
 column could come in is tried, twice converted too, the other sign, and angles or rates all in
-degrees; the reading that settles most findings is taken, and of several the one with factors
-nearest to one. A reading that agrees with nothing any more settles nothing: every relation that the
-columns had must still be seen.
+degrees; the likeliest is taken: that which breaks no identity and leaves the fewest findings. Those
+that are as likely are named. A reading that agrees with nothing any more settles nothing: every
+relation that the columns had must still be seen.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from host.arrays import Array
 from host.constants import GRAVITY_MPS2, RAD_PER_DEG
 from host.sysid.flight.column_map import UNITS
 from host.sysid.flight.data_finding import Finding
+from host.sysid.flight.driven_motion import CERTAIN
 from host.sysid.flight.kinematic_checks import misfit, related
 from host.sysid.flight.unit_sign_checks import SURFACES, airborne, check
 
@@ -25,6 +26,7 @@ ANGLES = ("alpha_rad", "beta_rad", "phi_rad", "theta_rad", "psi_rad")
 RATES = ("p_radps", "q_radps", "r_radps")
 FORCES = ("ax_mps2", "ay_mps2", "az_mps2")
 POSITIVE = ("airspeed_mps", "qbar_pa", "static_pa", "density_kgpm3", "throttle")
+MOST_NAMED = 3  # readings: more tell nothing
 ALIKE = 0.02  # factors that differ by less are one
 
 
@@ -36,6 +38,19 @@ class Reading:
     words: str
     gain: float = 1.0
     weight: bool = False
+    as_likely: tuple[str, ...] = ()  # words of other readings
+
+    @property
+    def line(self) -> str:
+        """What was done, and what else it may be."""
+        times = f" (times {self.gain:.4g})" if abs(self.gain) != 1.0 else ""
+        first = f"read as {self.words}{times}"
+        if not self.as_likely:
+            return first
+        others = " or ".join(self.as_likely)
+        if len(self.as_likely) < MOST_NAMED:
+            return f"{first}, or as likely {others}"
+        return f"its unit cannot be told, {first}, as likely {others}"
 
     def read(self, columns: Mapping[str, Array]) -> dict[str, Array]:
         """Return all columns, these read in this way."""
@@ -62,7 +77,7 @@ def reread(
     """
     proven = [f for f in findings if f.wrong_unit or f.check == "gravity"]
     before, seen = check(columns), related(*airborne(columns))
-    best: tuple[tuple[int, float], Reading, list[Finding]] | None = None
+    found: list[tuple[float, Reading, list[Finding]]] = []
     for reading in _readings(columns, proven):
         if set(reading.channels) & set(kept):
             continue
@@ -72,12 +87,14 @@ def reread(
         if not settled & {(f.check, f.channels) for f in proven} or len(after) >= len(before):
             continue
         flown, dt_s = airborne(trial)
-        if seen - related(flown, dt_s):
-            continue
-        score = len(after), misfit(flown, dt_s)
-        if best is None or score < best[0]:
-            best = score, reading, after
-    return None if best is None else (best[1], best[2])
+        if not seen - related(flown, dt_s):
+            score = round(misfit(flown, dt_s) + CERTAIN * len(after), 6)  # equal is equal
+            found.append((score, reading, after))
+    if not found:
+        return None
+    least, best, after = min(found, key=lambda one: one[0])
+    near = sorted((one for one in found if one[0] - least < CERTAIN), key=lambda one: one[0])
+    return replace(best, as_likely=tuple(one.words for _, one, _ in near[1:])), after
 
 
 def _readings(columns: Mapping[str, Array], findings: Sequence[Finding]) -> Iterator[Reading]:

@@ -13,13 +13,8 @@ import numpy as np
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.sysid.flight.data_finding import HINT, Finding
-from host.sysid.flight.kinematic_checks import (
-    BLOCK_S,
-    FEWEST,
-    SIGN_CORRELATION,
-    block_means,
-    consistent,
-)
+from host.sysid.flight.identity_factors import SIGN_CORRELATION, correlation
+from host.sysid.flight.kinematic_checks import BLOCK_S, FEWEST, block_means, consistent
 
 BOUNDED = ("alpha_rad", "beta_rad", "theta_rad")
 DOUBTFUL_RAD = 1.0  # of such an angle in flight, and of a surface at any moment
@@ -56,7 +51,8 @@ def check(columns: Mapping[str, Array]) -> list[Finding]:
     means = block_means(flown, max(1, round(BLOCK_S / dt_s)))
     if len(means["t_s"]) >= FEWEST:
         findings += [*_forces(means), *_surfaces(means)]
-    return _unique_findings([*findings, *consistent(flown, dt_s)])
+    weighed = not any(f.check == "gravity" for f in findings)
+    return _unique_findings([*findings, *consistent(flown, dt_s, weighed=weighed)])
 
 
 def airborne(columns: Mapping[str, Array]) -> tuple[dict[str, Array], float]:
@@ -170,7 +166,7 @@ def _forces(means: Mapping[str, Array]) -> list[Finding]:
         ("beta-against-ay", "beta_rad", "ay_mps2"),
     ):
         if angle in means and force in means:
-            agreement, _ = _correlation(np.diff(means[angle]), np.diff(means[force]))
+            agreement = correlation(np.diff(means[angle]), np.diff(means[force]))
             if agreement > SIGN_CORRELATION:
                 text = (
                     f"{angle} and {force} rise together (correlation {agreement:.2f}), where lift"
@@ -203,14 +199,3 @@ def _surfaces(means: Mapping[str, Array]) -> list[Finding]:
             causes = (f"the other sign: {HINT}", "feedback", "a canard")
             findings.append(Finding("surface-sign", (surface,), text, causes))
     return findings
-
-
-def _correlation(x: Array, y: Array) -> tuple[float, float]:
-    """Return the correlation, and how many times larger y swings than x."""
-    x, y = x - x.mean(), y - y.mean()
-    across = float(np.sqrt(np.sum(x**2) * np.sum(y**2)))
-    if across < 1e-12 * len(x):
-        return 0.0, 1.0
-    return float(np.sum(x * y)) / across, float(
-        np.sqrt(np.sum(y**2) / max(float(np.sum(x**2)), 1e-300))
-    )

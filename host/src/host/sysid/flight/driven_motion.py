@@ -1,0 +1,175 @@
+"""What surfaces drive of an identity: how far it is broken there, and by which factor of a column.
+
+Gusts turn the wind angles and change the speed as no rate and no force says. What surfaces drove
+has none of them: they and their past are instruments (Ljung, System Identification, sec. 7.6), and
+whatever of the identity they still explain breaks it. Each factor is put to that test (Anderson and
+Rubin, 1949) in place of an estimate of it: where surfaces drive little, every factor passes, where
+an estimate would be near to that of the gusts. The past of what is left whitens it, so pilots who
+answer gusts prove nothing either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+from scipy.special import chdtri
+
+from host.arrays import Array
+from host.sysid.flight.identity_factors import LARGEST_FACTOR, Identity
+
+PAST_STEPS = 6  # of what is left, that tell the next
+LAGS_STEPS = (0.0, 1.5, 4.0, 10.0, 30.0)  # of first order, behind a surface
+ROWS_EACH = 8  # for each number that is fitted: with fewer it explains gusts too
+SENSOR_SHARE, SENSOR_DELAY_S = 0.1, 0.03  # scale, delay and place of right sensors, one deviation
+UNKNOWN_SHARE = 0.1  # of a motion, that they make of it in other ways
+SHORTEST_S = 20.0  # a trend of a shorter record is explained by chance
+CERTAIN = 9.0  # of a chi-square of one unknown: three deviations
+CERTAIN_P = 0.0027  # the same, as what chance exceeds
+RIGHT = (1.0 / LARGEST_FACTOR, 1.0, LARGEST_FACTOR)
+TRIED = tuple(10.0 ** (0.1 * k) for k in range(-20, 21))
+
+
+@dataclass(frozen=True, slots=True)
+class DrivenFactor:
+    """How many times as fast a column moves as another says, in what surfaces drive.
+
+    It is certain not to be one: the likeliest value, and how far it leaves the identity broken.
+    """
+
+    law: Identity
+    name: str
+    slope: float
+    misfit: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """A signal and its past: along what surfaces explain at most, and all else of it."""
+
+    along: Array  # (instruments, past + 1)
+    rest: Array  # (steps, past + 1)
+
+    def plus(self, factor: float, other: _Seen) -> _Seen:
+        """Return the sum with another signal, so many times."""
+        return _Seen(self.along + factor * other.along, self.rest + factor * other.rest)
+
+
+class _Test:
+    """An identity before its instruments: rate, parts and errors of right sensors."""
+
+    def __init__(self, law: Identity) -> None:
+        columns = [_lagged(u, lag)[PAST_STEPS:] for u in law.inputs for lag in LAGS_STEPS]
+        own = np.column_stack([np.ones(len(law.rate)), *law.beside])[PAST_STEPS:]
+        self._own = _basis(own)
+        self._basis = _basis(_off(np.column_stack(columns), self._own))
+        self.instruments = self._basis.shape[1]
+        self.rate, self.delayed = self._seen(law.rate), {}
+        self.parts = {name: self._seen(part) for name, part in law.parts.items()}
+        self.terms = {name: self._seen(term) for name, term in law.terms.items()}
+        for name, values in (("", law.rate), *law.parts.items()):
+            delay_s = law.delays_s.get(name, SENSOR_DELAY_S)
+            self.delayed[name] = self._seen(delay_s * np.gradient(values, law.step_s))
+        self._errors = [self._seen(error) for error in law.sensors]
+
+    def misfit(self, scaled: str = "", factor: float = 1.0) -> float:
+        """Return how many deviations squared what surfaces explain of the identity is from none.
+
+        A part that counts `factor` times has no scale beside it.
+        """
+        left, errors = self.rate, [*self._errors, *self.delayed.values()]
+        for part in self.parts.values():
+            left = left.plus(-1.0, part)
+        if scaled:
+            left = left.plus(1.0 - factor, (self.parts | self.terms)[scaled])
+        beta, *_ = np.linalg.lstsq(left.rest[:, 1:], left.rest[:, 0], rcond=None)
+        weights = np.concatenate([[1.0], -beta])
+        free = len(left.rest) - len(beta) - self._own.shape[1] - self.instruments
+        variance = float(np.sum((left.rest @ weights) ** 2)) / free
+        variance += UNKNOWN_SHARE**2 * float(np.mean((self.rate.along @ weights) ** 2))
+        covariance = variance * np.eye(len(left.along))
+        scales = [part for name, part in self.parts.items() if name != scaled]
+        scales += [] if scaled else [self.rate]
+        for share, group in ((SENSOR_SHARE, scales), (1.0, errors)):
+            for one in group:
+                error = share * (one.along @ weights)
+                covariance += np.outer(error, error)
+        off = left.along @ weights
+        return float(off @ np.linalg.solve(covariance, off))
+
+    def _seen(self, values: Array) -> _Seen:
+        back = np.lib.stride_tricks.sliding_window_view(values, PAST_STEPS + 1)[:, ::-1]
+        back = _off(back, self._own)
+        along = self._basis.T @ back
+        return _Seen(along, back - self._basis @ along)
+
+
+def driven_misfit(law: Identity) -> float | None:
+    """Return how many deviations squared surfaces break an identity; None where none moved."""
+    return _Test(law).misfit() if _testable(law) else None
+
+
+def driven_factors(law: Identity) -> Iterator[DrivenFactor]:
+    """Return the factors that must be another than one, of those that explain the motion best."""
+    if not (law.driven and _testable(law)):
+        return
+    test = _Test(law)
+    least = test.misfit()
+    if least < chdtri(
+        test.instruments, CERTAIN_P
+    ):  # weak ones would choose among factors by chance
+        return
+    found = []
+    for name in (*law.parts, *law.terms):
+        broken = {f: test.misfit(name, f) for f in (-1.0, *TRIED)}
+        right = min(test.misfit(name, f) for f in RIGHT)
+        slope = min(broken, key=broken.__getitem__)
+        least = min(least, broken[slope], right)
+        if right - broken[slope] > CERTAIN:
+            found.append(DrivenFactor(law, name, slope, broken[slope]))
+    yield from (f for f in found if f.misfit - least < CERTAIN)
+
+
+def shared_factor(shares: Sequence[tuple[Identity, str]], tried: Iterable[float]) -> float | None:
+    """Return the factor that parts of several identities must share; None where it may be one.
+
+    Parameters
+    ----------
+    shares : sequence of (Identity, str)
+        Identities, and the part of each that has the factor.
+    tried : iterable of float
+        Factors that it may be.
+    """
+    tests = [(_Test(law), name) for law, name in shares if law.driven and _testable(law)]
+    whole = sum(test.misfit() for test, _ in tests)
+    if whole < CERTAIN:
+        return None
+    broken = {f: sum(test.misfit(name, f) for test, name in tests) for f in tried}
+    slope = min(broken, key=broken.__getitem__)
+    return slope if whole - broken[slope] > CERTAIN else None
+
+
+def _testable(law: Identity) -> bool:
+    count = PAST_STEPS + 1 + len(law.beside) + len(law.inputs) * len(LAGS_STEPS)
+    long = law.step_s * len(law.rate) >= SHORTEST_S
+    return long and len(law.inputs) > 0 and len(law.rate) - PAST_STEPS >= ROWS_EACH * count
+
+
+def _lagged(values: Array, steps: float) -> Array:
+    """Return values behind a lag of first order."""
+    keep = float(np.exp(-1.0 / steps)) if steps > 0.0 else 0.0
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values - np.median(values)))
+
+
+def _basis(columns: Array) -> Array:
+    """Return orthonormal columns that span some, without those that repeat others."""
+    size = np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
+    basis, strength, _ = np.linalg.svd(columns / size, full_matrices=False)
+    return np.asarray(basis[:, strength > 1e-4 * strength[0]])
+
+
+def _off(columns: Array, basis: Array) -> Array:
+    """Return columns without what a basis holds of them."""
+    return np.asarray(columns - basis @ (basis.T @ columns))
