@@ -223,6 +223,14 @@ def test_in_gusts_the_right_unit_is_among_the_likely_ones(unit: str, gusty: Colu
     assert not np.array_equal(columns["airspeed_mps"], wrong["airspeed_mps"])
 
 
+def test_a_relation_that_a_wrong_unit_made_need_not_stay() -> None:
+    """Speed seemed to follow ax turned by alpha of many turns: alpha was never read in degrees."""
+    flown = fly(Air("karman", 0.5, spread=True), 19402)[0]
+    columns, findings = checked(times("alpha_rad", DEG)(flown))
+    assert {f.done for f in findings} == {"read as alpha_rad in deg (times 0.01745)"}
+    np.testing.assert_allclose(columns["alpha_rad"], flown["alpha_rad"], rtol=1e-9)
+
+
 def test_lift_and_side_force_tell_together_what_none_does_alone() -> None:
     """Knots in gusts of 1 m/s: factors of 2 that each alone leaves open."""
     flown = fly(Air("dryden", 1.0), 19401)[0]

@@ -19,7 +19,7 @@ from host.constants import GRAVITY_MPS2, RAD_PER_DEG
 from host.sysid.flight.column_map import UNITS
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.driven_motion import CERTAIN
-from host.sysid.flight.kinematic_checks import misfit, related
+from host.sysid.flight.kinematic_checks import CHECK_OF, misfit, related
 from host.sysid.flight.unit_sign_checks import SURFACES, airborne, check
 
 ANGLES = ("alpha_rad", "beta_rad", "phi_rad", "theta_rad", "psi_rad")
@@ -87,7 +87,7 @@ def reread(
         if not settled & {(f.check, f.channels) for f in proven} or len(after) >= len(before):
             continue
         flown, dt_s = airborne(trial)
-        if not seen - related(flown, dt_s):
+        if not any(_hidden(pair, reading, before) for pair in seen - related(flown, dt_s)):
             score = round(misfit(flown, dt_s) + CERTAIN * len(after), 6)  # equal is equal
             found.append((score, reading, after))
     if not found:
@@ -95,6 +95,12 @@ def reread(
     least, best, after = min(found, key=lambda one: one[0])
     near = sorted((one for one in found if one[0] - least < CERTAIN), key=lambda one: one[0])
     return replace(best, as_likely=tuple(one.words for _, one, _ in near[1:])), after
+
+
+def _hidden(pair: tuple[str, str], reading: Reading, before: Sequence[Finding]) -> bool:
+    """Return whether a reading hides a relation: it was right, or the column read is part of it."""
+    right = CHECK_OF[pair] not in {f.check for f in before}
+    return right or any(name in part for name in reading.channels for part in pair)
 
 
 def _readings(columns: Mapping[str, Array], findings: Sequence[Finding]) -> Iterator[Reading]:
