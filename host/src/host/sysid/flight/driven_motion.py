@@ -14,11 +14,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 from scipy.special import chdtri
 
 from host.arrays import Array
 from host.sysid.flight.identity_factors import LARGEST_FACTOR, Identity
+from host.sysid.numerics.first_order_filter import first_order_filter
 
 PAST_STEPS = 6  # of what is left, that tell the next
 LAGS_STEPS = (0.0, 1.5, 4.0, 10.0, 30.0)  # of first order, behind a surface
@@ -160,7 +160,8 @@ def _testable(law: Identity) -> bool:
 def _lagged(values: Array, steps: float) -> Array:
     """Return values behind a lag of first order."""
     keep = float(np.exp(-1.0 / steps)) if steps > 0.0 else 0.0
-    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values - np.median(values)))
+    forget, recall = np.array([1.0 - keep, 0.0]), np.array([1.0, -keep])
+    return first_order_filter(forget, recall, values - np.median(values))
 
 
 def _basis(columns: Array) -> Array:

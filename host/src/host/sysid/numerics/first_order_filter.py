@@ -1,0 +1,26 @@
+"""A digital filter of first order along columns, from rest.
+
+`scipy.signal.lfilter` is the same; loading it takes 0.9 s, a fifth of an answer's time.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import linalg
+
+from host.arrays import Array
+
+
+def first_order_filter(b: Array, a: Array, values: Array) -> Array:
+    """Return y[k] = b_0 x[k] + b_1 x[k-1] - a_1 y[k-1], before the first sample x = y = 0.
+
+    Parameters
+    ----------
+    b, a : Array, shape (2,)
+        Numerator and denominator; a_0 = 1.
+    values : Array, shape (samples,) or (samples, columns)
+    """
+    driven = b[0] * values
+    driven[1:] += b[1] * values[:-1]
+    bands = np.broadcast_to(a[:, None], (2, len(values)))
+    return np.asarray(linalg.solve_banded((1, 0), bands, driven, check_finite=False))
