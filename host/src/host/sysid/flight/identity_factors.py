@@ -78,7 +78,12 @@ class Factor:
     name: str
     low: float
     high: float
-    certain: bool  # whether the sign is
+    explained: float  # share of the column's motion, of what the other parts leave
+
+    @property
+    def certain(self) -> bool:
+        """Whether the sign is."""
+        return self.explained >= SIGN_CORRELATION**2
 
     @property
     def misfit(self) -> float:
@@ -92,17 +97,17 @@ class Factor:
         return float((np.log(self.low) / spread) ** 2)
 
 
-def factors(law: Identity) -> Iterator[Factor]:
+def factors(law: Identity, least: float = FACTOR_CORRELATION) -> Iterator[Factor]:
     """Return the factor of each part that is correlated with an identity, the others apart."""
     own = np.column_stack([np.ones(len(law.rate)), *law.beside])
     for name, part in law.parts.items():
         others = [v for k, v in law.parts.items() if k != name]
         x, y = (without(v, np.column_stack([own, *others])) for v in (part, law.rate))
         xx, yy, xy = float(x @ x), float(y @ y), float(x @ y)
-        if xx < 1e-12 * len(x) or xy**2 < FACTOR_CORRELATION**2 * xx * yy:
+        if xx < 1e-12 * len(x) or xy == 0.0 or xy**2 < least**2 * xx * yy:
             continue
         low, high = sorted((xy / xx, yy / xy))  # noise on the left side, noise on the right
-        yield Factor(law, name, low, high, xy**2 >= SIGN_CORRELATION**2 * xx * yy)
+        yield Factor(law, name, low, high, xy**2 / (xx * yy))
 
 
 def without(values: Array, columns: Array) -> Array:

@@ -26,6 +26,7 @@ from host.sysid.flight.driven_motion import (
     shared_factor,
 )
 from host.sysid.flight.identity_factors import (
+    FACTOR_CORRELATION,
     LARGEST_FACTOR,
     SIGN_CORRELATION,
     Factor,
@@ -39,6 +40,7 @@ UNIT_MARGIN = 1.1  # about the range of factors: a unit's outside it is none
 MOTION_SHARE = 0.3  # of what a law leaves: with less it is noise
 ANGLE_EXPLAINED = 0.3  # of an angle's rate that the gyro explains: less is another signal
 WIND_ANGLE_EXPLAINED = 0.05  # the same of a wind angle, which gusts turn too
+UNDRIVEN_EXPLAINED = 0.75  # of a wind angle that no surface drives: of less the slope is gusts'
 QUIET_RADPS = 0.02  # noise of a still sensor follows nothing
 BLOCK_S, SLOW_S = 0.1, 0.5  # slopes are those of means over this long; slow: pitot and GPS
 FEWEST = 32  # means
@@ -87,7 +89,7 @@ def consistent(flown: Mapping[str, Array], dt_s: float, *, weighed: bool = True)
                 continue
             # Gusts turn this wind angle, where no surface does: no rate says so.
         else:
-            findings += [one for f in factors(law) if (one := _judge(f)) is not None]
+            findings += [one for f in _told(law) if (one := _judge(f)) is not None]
         findings += map(_judge_driven, driven_factors(law) if weighed else ())
     if weighed and not any(f.wrong_unit for f in findings):
         findings += _judge_airspeed(laws)
@@ -103,9 +105,23 @@ def misfit(flown: Mapping[str, Array], dt_s: float) -> float:
     return total
 
 
-def related(flown: Mapping[str, Array], dt_s: float) -> set[tuple[str, str]]:
-    """Return what is seen to move with what: a column, and a part of its identity."""
-    return {(law.name, f.name) for law in identities(flown, dt_s) for f in factors(law)}
+def related(
+    flown: Mapping[str, Array], dt_s: float, least: float = FACTOR_CORRELATION
+) -> dict[tuple[str, str], float]:
+    """Return what moves with what, a column and a part of its identity, and how closely."""
+    laws = identities(flown, dt_s)
+    return {(law.name, f.name): f.explained**0.5 for law in laws for f in factors(law, least)}
+
+
+def _told(law: Identity) -> Iterator[Factor]:
+    """Return the factors that no gusts made.
+
+    An aircraft turns into the gusts that turn its wind angles, slower than they do: a rate that
+    only answers them explains little of the angle, and the slope between both is no scale. An
+    airliner's sideslip of a flight without rudder moved 2.3 to 2.7 times as fast as its yaw rate.
+    """
+    gusty = law.opposed < -SIGN_CORRELATION and not law.driven
+    return (f for f in factors(law) if not gusty or f.explained >= UNDRIVEN_EXPLAINED)
 
 
 def identities(flown: Mapping[str, Array], dt_s: float) -> Iterator[Identity]:

@@ -19,6 +19,7 @@ from host.constants import GRAVITY_MPS2, RAD_PER_DEG
 from host.sysid.flight.column_map import UNITS
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.driven_motion import CERTAIN
+from host.sysid.flight.identity_factors import FACTOR_CORRELATION
 from host.sysid.flight.kinematic_checks import CHECK_OF, misfit, related
 from host.sysid.flight.unit_sign_checks import SURFACES, airborne, check
 
@@ -28,6 +29,7 @@ FORCES = ("ax_mps2", "ay_mps2", "az_mps2")
 POSITIVE = ("airspeed_mps", "qbar_pa", "static_pa", "density_kgpm3", "throttle")
 MOST_NAMED = 3  # readings: more tell nothing
 ALIKE = 0.02  # factors that differ by less are one
+KEPT_SHARE = 0.5  # of a correlation: one that hardly counted need not do so in another unit
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +89,13 @@ def reread(
         if not settled & {(f.check, f.channels) for f in proven} or len(after) >= len(before):
             continue
         flown, dt_s = airborne(trial)
-        if not any(_hidden(pair, reading, before) for pair in seen - related(flown, dt_s)):
+        close = related(flown, dt_s, least=0.0)
+        lost = [
+            pair
+            for pair, was in seen.items()
+            if close.get(pair, 0.0) < min(FACTOR_CORRELATION, KEPT_SHARE * was)
+        ]
+        if not any(_hidden(pair, reading, before) for pair in lost):
             score = round(misfit(flown, dt_s) + CERTAIN * len(after), 6)  # equal is equal
             found.append((score, reading, after))
     if not found:
