@@ -119,6 +119,18 @@ def test_without_airspeed_the_default_models_are_those_that_need_none(
     assert any("without airspeed_mps longitudinal and lateral" in note for note in found.notes)
 
 
+def test_without_attitude_the_default_models_are_those_that_need_none(
+    pitching: pd.DataFrame,
+) -> None:
+    """Lift, pitch and airspeed were refused: longitudinal needs theta."""
+    table = pitching.assign(airspeed_mps=SPEED_MPS, r_radps=2e-4 * np.sin(pitching["t_s"]))
+    found = host.identify(table, delays=False)
+    held(found, SHORT_PERIOD)
+    assert [a.template for a in found.linear] == ["short-period"]
+    for missing, model in (("theta_rad", "short-period"), ("phi_rad", "dutch-roll")):
+        assert any(f"without {missing}" in n and f"{model} in its place" in n for n in found.notes)
+
+
 def test_a_table_without_a_surface_says_so(pitching: pd.DataFrame) -> None:
     with pytest.raises(IdentificationError, match=r"no column of a surface .*argument mapping"):
         host.identify(pitching.drop(columns="elevator_rad"), models="short-period")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -34,6 +34,14 @@ WITHOUT_VANES = (
     {"longitudinal": "short-period"},
     "without vanes longitudinal (speed, drag and lift curve) cannot be told: short-period by q"
     " and az in its place",
+)
+WITHOUT_PITCH = (
+    {"longitudinal": "short-period"},
+    "without theta_rad longitudinal cannot be told: short-period in its place",
+)
+WITHOUT_BANK = (
+    {"lateral": "dutch-roll"},
+    "without phi_rad lateral cannot be told: dutch-roll in its place",
 )
 ModelName = str | Path | LinearModel | CoefficientModel
 
@@ -120,14 +128,26 @@ def possible_models(asked: Models, columns: Sequence[Collection[str]]) -> tuple[
     """
     if asked.named:
         return asked, []
-    if not all("airspeed_mps" in c for c in columns):
-        instead, note = WITHOUT_AIRSPEED
-    elif all("alpha_rad" not in c and "az_mps2" in c for c in columns):
-        instead, note = WITHOUT_VANES
-    else:
-        return asked, []
+    instead: dict[str, str] = {}
+    notes: list[str] = []
+    for models, note in _wanting(columns):
+        instead = models | instead
+        notes.append(note)
     linear = tuple((instead.get(name, name), own) for name, own in asked.linear)
-    return replace(asked, linear=linear), [note]
+    return replace(asked, linear=linear), notes
+
+
+def _wanting(columns: Sequence[Collection[str]]) -> Iterator[tuple[dict[str, str], str]]:
+    """Return which models stand in the place of default ones for want of which column, and why."""
+    if not all("airspeed_mps" in c for c in columns):
+        yield WITHOUT_AIRSPEED
+        return
+    if all("alpha_rad" not in c and "az_mps2" in c for c in columns):
+        yield WITHOUT_VANES
+    elif any("q_radps" in c and "theta_rad" not in c for c in columns):
+        yield WITHOUT_PITCH
+    if any("r_radps" in c and "phi_rad" not in c for c in columns):
+        yield WITHOUT_BANK
 
 
 def _terms(given: CoefficientModel | Path | str) -> CoefficientModel:
