@@ -192,10 +192,6 @@ def correct_trim_departure(
     base = result.model
     if base.name not in SECOND_ORDER_TERMS or not all(name in cuts[0] for name in MEASURED):
         return None
-    # Where a vane measured the angle, `longitudinal` has airspeed as a state; a plain short period
-    # stays what it is.
-    if base.name == "short-period" and "alpha_rad" in base.outputs:
-        return None
     one_step = one_step_of(result, maneuvers if fitted is None else fitted, trim)
     if one_step is None:
         return None
