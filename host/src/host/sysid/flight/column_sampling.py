@@ -19,6 +19,7 @@ COARSE = 0.5  # more different values than this share of the rows: the step is b
 AT_ROWS = 0.95  # of the changes happen at rows of one hold
 RUN_SHARE, RUN_SPREAD = 0.7, 0.2  # of the runs are as long as the median, to this share of it
 LONGEST_HOLD = 100
+REPEATED_SHARE = 0.5  # of the rows between samples that have a value, of a hold
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,11 +38,27 @@ def sampled_name(name: str) -> str:
 
 
 def sampling_of(values: Array) -> Sampling:
-    """Return step and hold of a column of (n,) values; what is missing counts as sampled."""
+    """Return step and hold of a column of (n,) values; a missing one breaks no hold."""
+    whole = _filled(values)
+    found = _sampling_of_whole(whole, quantum(values))
+    # Rows of a slow sensor that are empty in between repeat nothing.
+    repeated = np.isfinite(values[~found.sampled])
+    if found.hold > 1 and np.mean(repeated) < REPEATED_SHARE:
+        return Sampling(found.step, 1, np.ones(len(values), dtype=bool))
+    return found
+
+
+def _filled(values: Array) -> Array:
+    """Return the values, each missing one as the last before it; the first ones as the next."""
+    seen = np.isfinite(values)
+    if seen.all() or not seen.any():
+        return values
+    last = np.maximum.accumulate(np.where(seen, np.arange(len(values)), -1))
+    return np.asarray(values[np.where(last < 0, int(np.argmax(seen)), last)])
+
+
+def _sampling_of_whole(values: Array, step: float) -> Sampling:
     every = np.ones(len(values), dtype=bool)
-    step = quantum(values)
-    if not np.isfinite(values).all():
-        return Sampling(step, 1, every)
     starts, lengths = runs(values)
     if len(starts) - 2 < FEWEST:
         return Sampling(step, 1, every)
