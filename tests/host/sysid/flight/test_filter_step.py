@@ -62,21 +62,31 @@ def test_slow_columns_of_others_and_longitudinal_ones_stay_as_they_are() -> None
 
 
 @pytest.mark.parametrize(
-    ("maker", "dt_s", "method"),
+    ("maker", "dt_s", "slow", "method"),
     [
-        (OWN, 0.01, "output-error-white"),
-        (AUTOPILOT, 0.005, "output-error-white"),
-        (OWN, 0.02, "filter-error-gust"),
-        (FOREIGN, 0.01, "filter-error-gust"),
+        (OWN, 0.01, "p_radps", "output-error-white"),
+        (AUTOPILOT, 0.005, "p_radps", "output-error-white"),
+        (OWN, 0.01, "beta_rad", "filter-error-gust"),
+        (AUTOPILOT, 0.005, "phi_rad", "filter-error-gust"),
+        (OWN, 0.02, "p_radps", "filter-error-gust"),
+        (FOREIGN, 0.01, "p_radps", "filter-error-gust"),
     ],
 )
-def test_a_slow_sensor_of_ours_has_no_means_and_no_filter_at_a_shorter_step(
-    maker: str, dt_s: float, method: str
+def test_a_slow_gyro_of_ours_has_no_means_and_no_filter_at_a_shorter_step(
+    maker: str, dt_s: float, slow: str, method: str
 ) -> None:
-    flown = [_flown(dt_s, known=True, maker=maker, slow=("beta_rad",))]
+    flown = [_flown(dt_s, known=True, maker=maker, slow=(slow,))]
     _, chosen, remarks = model_and_method(flown, Trim(18.0), "lateral", "flight", None)
     assert chosen == method
     assert any("no means over 20 ms" in line for line in remarks) == (method != "filter-error-gust")
+
+
+def test_a_slow_column_was_measured_in_the_means_that_hold_a_sample() -> None:
+    model = template("lateral", Trim(18.0))
+    [mean] = with_filter_step([_flown(0.01, known=True, slow=("beta_rad",))], model)
+    seen = mean.cut(model).seen
+    at = [model.outputs.index(name) for name in ("beta_rad", "p_radps")]
+    assert seen[:, at].mean(axis=0) == pytest.approx([2 / 5, 1.0], abs=0.01)
 
 
 @pytest.mark.parametrize(

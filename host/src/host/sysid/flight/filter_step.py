@@ -5,8 +5,9 @@ reads the aircraft's dynamics from samples next to each other. Between these our
 low-pass and a straight line to the instant of the row: what is missing there passes for the
 aircraft. On recorded flights L_p and L_da came out 15 and 14 % small at a step of 10 ms, and 9 and
 6 % with perfect sensors and [1 2 1] / 4 over all columns alike; within 2 % at 20 ms. Means take the
-same off inputs and outputs, which to a linear model is no error. A slow sensor has no such mean:
-its record stays with output error.
+same off inputs and outputs, which to a linear model is no error. Of a slow sensor the mean is that
+of the curve through its samples. Where the roll rate itself is slow, the gusts in between are in no
+curve: its record stays with output error.
 
 Columns of others are fitted as they are, with an aircraft file and without: means hide from a
 filter that a pilot or an autopilot follows the roll rate (on the independent flights L_p 4 to 7 %
@@ -20,9 +21,11 @@ from dataclasses import replace
 
 from host.instrument.recording import FOREIGN
 from host.sysid.estimators.gust_penetration import ROLL_STATES
+from host.sysid.flight.column_sampling import sampled_name
 from host.sysid.flight.reconstructed_flight import FlownManeuver
 from host.sysid.models.state_space_model import LinearModel
 
+ROLL_RATE = "p_radps"
 STEP_S = 0.02  # at 30 ms the input between samples counts: L_da 5 % large
 
 
@@ -53,11 +56,12 @@ def rolling_gust_identifiable(maneuvers: Sequence[FlownManeuver]) -> bool:
 def no_filter_step(maneuvers: Sequence[FlownManeuver], model: LinearModel) -> str:
     """Return why a filter cannot have the step that it needs; empty where it can.
 
-    Means over `STEP_S` would have what a slow sensor did not measure.
+    Means over `STEP_S` would have what a slow gyro did not measure.
     """
-    if not _needs_means(maneuvers, model) or not any(m.cut(model).held for m in maneuvers):
+    slow = sampled_name(ROLL_RATE)
+    if not _needs_means(maneuvers, model) or not any(slow in m.inside() for m in maneuvers):
         return ""
-    return f"a slow sensor has no means over {1000.0 * STEP_S:g} ms, which air that rolls needs"
+    return f"a slow gyro has no means over {1000.0 * STEP_S:g} ms, which air that rolls needs"
 
 
 def with_filter_step(maneuvers: Sequence[FlownManeuver], model: LinearModel) -> list[FlownManeuver]:

@@ -162,7 +162,7 @@ class FlownManeuver:
         if not any(sampled_name(c) in cut for c in outputs):
             return None
         every = np.ones(len(cut["t_s"]))
-        return np.column_stack([cut.get(sampled_name(c), every) > 0.5 for c in outputs])
+        return np.column_stack([cut.get(sampled_name(c), every) > 0.0 for c in outputs])
 
 
 def reconstruct_flight(
