@@ -114,6 +114,18 @@ def test_a_gap_divides_a_stretch(flight: Columns) -> None:
         select_maneuvers(none, numbers=[1])
 
 
+def test_a_part_of_a_stretch_at_rest_belongs_to_what_moved_in_it(flight: Columns) -> None:
+    """Noise of the ailerons behind a gap made a lateral answer of an elevator maneuver."""
+    t, rng = flight["t_s"], np.random.default_rng(1)
+    last = max(f.input_end_s for f in detect_maneuvers(flight) if f.axis == "elevator_rad")
+    gap = {**flight, "bridged": ((t > last + 0.5) & (t < last + 1.0)).astype(float)}
+    for name in ("elevator_rad", "aileron_rad", "rudder_rad"):
+        level = np.where(t > last + 0.5, flight[name][0], flight[name])
+        gap[name] = level + 1e-4 * rng.standard_normal(len(t))
+    found = select_maneuvers(gap, stretches=[(last - 2.0, last + 3.0)])
+    assert [f.axis for f in found] == ["elevator_rad", "elevator_rad"]
+
+
 def test_stretches_that_overlap_are_said(flight: Columns, tmp_path: Path) -> None:
     """They are one: no sample counts twice; those that only touch stay two."""
     assert overlap_notes([(12.0, 14.0), (14.0, 16.0)]) == []

@@ -22,6 +22,7 @@ SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad")
 FEWEST = 8  # samples, as a maneuver needs
 SHORTEST_STRETCH_S = 0.9  # two short periods of a trainer; 0.35 s put two derivatives under "trust"
 SHARED_S = 0.1  # windows that overlap by more are one
+MOVED_SHARE = 0.1  # of the motion in a stretch: a part with less of it is at rest
 TOUCHING_S = 0.1  # nothing moved between windows no further apart
 HELD_OUT_FROM = 3  # maneuvers of an axis, of which one is held out
 TimeSpan = tuple[float | None, float | None]  # from and to, s; None is the end of the record
@@ -92,7 +93,8 @@ def _span_maneuvers(columns: Mapping[str, Array], span: TimeSpan) -> list[Detect
             f"{asked}: {length_s:.2g} s of data, at least {SHORTEST_STRETCH_S:g} s are needed"
             + (", in longer pieces" if length_s >= SHORTEST_STRETCH_S else "")
         )
-    return [item for part in parts for item in _given(columns, part)]
+    leading = _leading(columns, np.concatenate(parts))
+    return [item for part in parts for item in _given(columns, part, leading)]
 
 
 def overlap_notes(stretches: Sequence[TimeSpan]) -> list[str]:
@@ -113,10 +115,24 @@ def _fitted(t: Array) -> int:
     return int(np.sum(t > t[0] + LEAD_S)) if len(t) else 0
 
 
-def _given(columns: Mapping[str, Array], part: IntArray) -> list[DetectedManeuver]:
+def _leading(columns: Mapping[str, Array], rows: IntArray) -> dict[str, float]:
+    """Return by how much the surfaces moved that moved most."""
+    swing = {axis: float(np.ptp(columns[axis][rows])) for axis in SURFACES if axis in columns}
+    return {axis: size for axis, size in swing.items() if size > 0.5 * max(swing.values())}
+
+
+def _given(
+    columns: Mapping[str, Array], part: IntArray, whole: Mapping[str, float]
+) -> list[DetectedManeuver]:
+    """Return a part of a stretch once for each surface that leads in it.
+
+    Behind a gap the aircraft may swing with its surfaces at rest: of what led in the `whole`.
+    """
     t = columns["t_s"][part]
-    swing = {axis: float(np.ptp(columns[axis][part])) for axis in SURFACES if axis in columns}
-    leading = {a: size for a, size in swing.items() if size > 0.5 * max(swing.values())}
+    leading = _leading(columns, part)
+    rest = MOVED_SHARE * max(whole.values(), default=0.0)
+    if max(leading.values(), default=0.0) < rest:
+        leading = {axis: float(np.ptp(columns[axis][part])) for axis in whole}
     return [
         DetectedManeuver(
             axis=axis,
