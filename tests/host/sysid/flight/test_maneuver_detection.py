@@ -53,6 +53,21 @@ def test_all_of_a_multisine_is_found(
         assert last_s >= lead_s + 19.9, seed
 
 
+@pytest.mark.parametrize("share", [0.3, 0.45, 0.8])
+def test_multisines_of_three_surfaces_at_once_are_all_found(share: float) -> None:
+    """That of the elevator, less than half of the rudder's, passed for an echo of it."""
+    t, rng = np.arange(26.0 / 0.02) * 0.02, np.random.default_rng(7)
+    for seed in range(10):
+        waves = [
+            multisine(t, 2.0, np.radians(8.0) * size, 3 * seed + k)
+            + np.radians(0.02) * rng.standard_normal(len(t))
+            for k, size in enumerate((share, 0.5, 1.0))
+        ]
+        found = found_in(t, waves[0], aileron_rad=waves[1], rudder_rad=waves[2])
+        assert {f.axis for f in found} == {"elevator_rad", "aileron_rad", "rudder_rad"}, seed
+        assert all(f.input_end_s - f.start_s > 16.0 for f in found)
+
+
 @pytest.mark.parametrize("unit_s", [0.3, 0.7, 1.0, 1.5])
 def test_a_slow_3211_is_one_maneuver(unit_s: float) -> None:
     t = np.arange(0.0, 60.0, 0.02)

@@ -38,6 +38,8 @@ SWEEP_LEAD_S = 25.0  # slow swings of a sweep are looked for this far before its
 STEADY_TREND = 0.6  # rank correlation of swing length with order: a sweep's swings shorten
 SWEEP_GAP_S = 1.2  # a 0.15 Hz sine is near its trim no longer than this
 FAINT = 0.2  # of an input: a weaker one of another surface is the pilot's, and ends no response
+SUSTAINED = {"multisine", "sweep"}
+TOGETHER_S = 2.0  # between the ends of inputs flown together, whose first swings may be slow
 RESPONSE_S = 3.0  # the window reaches this long past the last edge
 LEAD_S = 0.3  # of trim before the input, in a fit
 TRIM_S = 1.0  # quiet time before the input
@@ -254,7 +256,7 @@ def _describe(
     if len(runs) < 3 and abs(settle - trim) > 0.6 * amplitude:
         return []  # a step that stays is a change of trim (a launch), not a test input
     kind = _kind(runs)
-    if kind in ("sweep", "multisine"):
+    if kind in SUSTAINED:
         start = _slow_start(t, series, start, amplitude)
     return [
         DetectedManeuver(
@@ -348,7 +350,11 @@ def _bounded(found: list[DetectedManeuver], last_s: float) -> list[DetectedManeu
     kept: list[DetectedManeuver] = []
     for item in found:
         overlaps = [
-            k for k in kept if item.start_s < k.input_end_s and k.start_s < item.input_end_s
+            k
+            for k in kept
+            if item.start_s < k.input_end_s
+            and k.start_s < item.input_end_s
+            and not _flown_together(item, k)
         ]
         weaker = [k for k in overlaps if _strength(k) < 0.5 * _strength(item)]
         if len(overlaps) > len(weaker):
@@ -359,9 +365,24 @@ def _bounded(found: list[DetectedManeuver], last_s: float) -> list[DetectedManeu
     kept.sort(key=lambda f: f.start_s)
     result = []
     for k, item in enumerate(kept):
-        limit = next((f.start_s for f in kept[k + 1 :] if not _faint_beside(f, item)), last_s)
+        later = (f for f in kept[k + 1 :] if not _flown_together(f, item))
+        limit = next((f.start_s for f in later if not _faint_beside(f, item)), last_s)
         result.append(replace(item, end_s=min(item.end_s, max(limit, item.input_end_s), last_s)))
     return result
+
+
+def _flown_together(item: DetectedManeuver, other: DetectedManeuver) -> bool:
+    """Return whether two inputs that go on begin and end as one: no echo, however unlike in size.
+
+    A pilot who handles the aircraft in an input begins later and goes on behind it.
+    """
+    ends = (item.start_s - other.start_s, item.input_end_s - other.input_end_s)
+    sizes = sorted((_strength(item), _strength(other)))
+    return (
+        {item.kind, other.kind} <= SUSTAINED
+        and max(map(abs, ends)) < TOGETHER_S
+        and sizes[0] > FAINT * sizes[1]
+    )
 
 
 def _faint_beside(other: DetectedManeuver, item: DetectedManeuver) -> bool:
