@@ -1,6 +1,7 @@
 """Options of the network from outside: start, lambda, rho, iterations; and how methods settle."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -129,6 +130,34 @@ def test_how_recursive_settles_is_written(table: Path, tmp_path: Path, method: s
     assert history["M_alpha"].iloc[-1] == pytest.approx(-80.0, rel=0.1)
     error = (history["M_alpha"] + 80.0).abs()
     assert error.iloc[-1] < max(0.5 * error.max(), 0.5)  # of 80: the first may be right already
+
+
+@pytest.mark.parametrize("forgetting", [0.99, 0.98])
+def test_intervals_are_those_of_what_was_not_forgotten(forgetting: float) -> None:
+    """Over sixty draws of noise the half-width is twice the scatter (a tenth of it before)."""
+    model = navion_free()
+    found = [
+        fit("recursive", model, [with_rates(seed, snr=10.0)], forgetting=forgetting)
+        for seed in range(60)
+    ]
+    scatter = np.std([r.estimate for r in found], axis=0, ddof=1)
+    half = np.median([r.half_width() for r in found], axis=0)
+    share = half / scatter
+    assert 1.5 < np.median(share) < 3.0
+    assert np.all(share > 0.8)
+
+
+def test_nothing_forgotten_leaves_the_intervals_of_the_regression() -> None:
+    model, data = navion_free(), [with_rates(1, snr=10.0)]
+    batch, whole = fit("equation-error", model, data), fit("recursive", model, data)
+    np.testing.assert_array_equal(whole.half_width(), batch.half_width())
+
+
+def test_a_bias_of_a_maneuver_long_forgotten_has_an_interval() -> None:
+    model = replace(navion_free(), state_biases=("q_radps",))
+    found = fit("recursive", model, [with_rates(k, snr=10.0) for k in (1, 2)], forgetting=0.5)
+    assert np.all(found.half_width() > 0.0)
+    assert np.isfinite(found.half_width()).all()
 
 
 def test_a_method_that_does_not_settle_has_no_history(

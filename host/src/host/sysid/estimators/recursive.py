@@ -24,6 +24,7 @@ from host.sysid.numerics.output_error_problem import check_shapes
 
 Spectrum = NDArray[np.complexfloating]
 START_VARIANCE = 1e8  # of scaled regressors: a start with negligible weight
+LEAST_WEIGHT = 1e-150  # of a sample long forgotten; its square is still a number
 SPACING_HZ = 0.04  # spacing of the running transforms
 
 
@@ -75,14 +76,15 @@ def fit_recursive_least_squares(
     model, maneuvers
         Model and data; entries must not be tied across equations.
     forgetting : float
-        Weight of the past per sample, above 0 and at most 1.
+        Weight of the past per sample, above 0 and at most 1; intervals are as wide as what it
+        leaves.
     bandwidth : float, optional
         Of the differentiation, Hz.
     """
     if not 0.0 < forgetting <= 1.0:
         raise IdentificationError(f"forgetting {forgetting}, expected above 0 and at most 1")
     names, equations = regression_equations(model, maneuvers, bandwidth=bandwidth)
-    theta = np.zeros(len(names))
+    theta, wider = np.zeros(len(names)), np.ones(len(names))
     histories: list[Array] = []
     for equation in sorted({row.equation for row in equations}):
         mine = [row for row in equations if row.equation == equation]
@@ -102,11 +104,36 @@ def fit_recursive_least_squares(
         full[:, active] = history / scale
         histories.append(full)
         theta[active] = estimate / scale
+        if forgetting < 1.0:
+            wider[active] = _widened_by_forgetting(X[:, active] / scale, forgetting)
     batch = fit_equation_error(model, maneuvers, bandwidth=bandwidth)
     history = np.sum(histories, axis=0)
-    return _with_batch_statistics(
+    result = _with_batch_statistics(
         batch, "recursive least squares", names, theta, history, _elapsed_s(maneuvers), equations
     )
+    both = np.outer(wider, wider)
+    # Samples of equal weight that would know as much.
+    remembered = (1.0 + forgetting) / (1.0 - forgetting) if forgetting < 1.0 else np.inf
+    return replace(
+        result,
+        covariance=both * result.covariance,
+        covariance_white=both * result.covariance_white,
+        degrees_of_freedom=np.minimum(result.degrees_of_freedom, remembered),
+    )
+
+
+def _widened_by_forgetting(regressors: Array, forgetting: float) -> Array:
+    """Return the standard errors of an estimate that forgets over those of one that does not, (n,).
+
+    With weights w of the samples the covariance is (X'wX)^-1 X'w^2X (X'wX)^-1 times the residuals'
+    variance.
+    """
+    ages = np.arange(len(regressors))[::-1]
+    weight = np.maximum(forgetting**ages, LEAST_WEIGHT)[:, None]
+    inverse = covariance_from_information(regressors.T @ (weight * regressors))
+    forgotten = inverse @ (regressors.T @ (weight**2 * regressors)) @ inverse
+    whole = covariance_from_information(regressors.T @ regressors)
+    return np.asarray(np.sqrt(np.diag(forgotten) / np.diag(whole)))
 
 
 def _elapsed_s(maneuvers: Sequence[Maneuver]) -> Array:
