@@ -183,8 +183,19 @@ def test_the_answer_says_since_when_it_settled(
     assert told["step"] == "t_s"
     assert {k: round(v, 2) for k, v in told["since"].items()} == since
     assert bool(rest) == bool(told["not_settled"])
-    assert identified(table, "hopfield-line-search", "--method-option", "iterations=2") == 0
+    options = ["--method-option", "iterations=2", "--method-option", "start=model"]
+    assert identified(table, "hopfield-line-search", *options) == 0
     assert "error of the original program" in capsys.readouterr().out
+
+
+def test_a_search_that_stands_still_says_so(
+    table: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Least squares is the fixed point of the network: no step of it is one."""
+    assert identified(table, "hopfield-line-search", "--method-option", "iterations=2") == 0
+    out = capsys.readouterr().out
+    assert "no sweep lowered the error of the original program" in out
+    assert "settled, within" not in out
 
 
 def test_what_moves_until_the_end_has_not_settled(

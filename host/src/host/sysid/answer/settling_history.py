@@ -15,6 +15,7 @@ from host.sysid.flight.linear_answer import Answer
 
 SETTLED = 0.1  # of the end
 LATE = 0.85  # of all steps: what moves straight on is within a tenth of its end from 0.9 on
+STILL = 1e-4  # of the error of the line search, lowered by less: its start but for rounding
 # What a step is, by what a method notes of it.
 STEPS = {"history_step": "iteration", "history_s": "t_s"}
 
@@ -72,6 +73,13 @@ def settling_lines(answer: Answer) -> list[str]:
     found = settling_of(answer)
     if found is None:
         return []
+    error = np.asarray(answer.result.details.get("history_error_percent", ()))
+    if len(error) and error[0] - error[-1] <= STILL * error[0]:
+        return [
+            f"  no sweep lowered the error of the original program ({error[0]:.4g} %): the answer"
+            " is its start; at least squares the network stands still, start=model and start=zero"
+            " (method option) let it move"
+        ]
     timed = found.step == STEPS["history_s"]
     show, of = ("{:.2f}", "s of the data fitted") if timed else ("{:.0f}", "iteration")
     since = ", ".join(f"{name} {show.format(when)}" for name, when in found.since.items())
@@ -80,9 +88,7 @@ def settling_lines(answer: Answer) -> list[str]:
         f"  settled, within 10 % of its end, since ({of}, of {show.format(found.end)}): "
         f"{since}{moving}"
     ]
-    details = answer.result.details
-    if "history_error_percent" in details:
-        error = np.asarray(details["history_error_percent"])
+    if len(error):
         lines.append(
             f"  error of the original program {error[0]:.4g} to {error[-1]:.4g} % in"
             f" {found.end:.0f} sweeps"
