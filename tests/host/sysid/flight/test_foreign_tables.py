@@ -461,3 +461,19 @@ def test_spikes_and_dropouts_count_as_missing(
     assert any("alpha_rad stands still at 0 deg for 0.60 s from 20 s" in n for n in notes)
     assert any(n.startswith("beta_rad: 31 values far out") for n in notes)
     assert any("missing within the flight" in n and "beta_rad" in n for n in notes)
+
+
+@pytest.mark.filterwarnings("error")
+def test_infinities_count_as_missing(tmp_path: Path) -> None:
+    """A division by zero of somebody's export: no warning on the screen, a note with the column."""
+    t = np.arange(0.0, 12.0, 0.02)
+    table = pd.DataFrame({"t_s": t, "airspeed_mps": 17.0 + 0.1 * np.sin(t)})
+    for name in ("alpha_rad", "q_radps", "p_radps", "r_radps", "beta_rad", "elevator_rad"):
+        table[name] = 0.05 * np.sin(3.0 * t + len(name))
+    table.loc[200:205, "alpha_rad"] = np.inf
+    table.loc[206, "alpha_rad"] = -np.inf
+    path = tmp_path / "t.csv"
+    table.to_csv(path, index=False)
+    columns, notes = read_columns(path)
+    assert np.isfinite(columns["alpha_rad"]).all()
+    assert any("alpha_rad: 7 of 600 values are infinite and count as missing" in n for n in notes)

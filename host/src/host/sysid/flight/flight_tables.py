@@ -29,6 +29,7 @@ from host.sysid.flight.foreign_tables import (
     Foreign,
     from_frame,
     is_text,
+    leave_infinities_out,
     read_foreign,
     refuse_other,
     same_length,
@@ -134,6 +135,7 @@ def read_flight_columns(
         sensors,
         row_rate_hz,
     )
+    leave_infinities_out(found)
     called = source_name(source)
     raw, notes = dict(found.columns), found.notes
     if mapping is not None:

@@ -137,6 +137,17 @@ def from_frame(frame: pd.DataFrame) -> Foreign:
     return found
 
 
+def leave_infinities_out(found: Foreign) -> None:
+    """Take what is infinite in a column for missing, and say so."""
+    for name, values in found.columns.items():
+        infinite = np.isinf(values)
+        if infinite.any():
+            found.columns[name] = np.where(infinite, np.nan, values)
+            line = f"{np.sum(infinite)} of {len(values)} values are infinite and count as missing"
+            before = found.remarks.get(name)
+            found.remarks[name] = f"{before}; {line}" if before else line
+
+
 def _from_text(found: Foreign, name: str, values: pd.Series[Any]) -> None:
     import pandas as pd
 
