@@ -139,6 +139,24 @@ def test_equations_that_are_linear_predict_as_the_linear_model(
             )
 
 
+def test_equations_start_from_the_trim_where_nothing_is_fitted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From the mean of 0.3 s, not from one sample, which an outlier would make another flight."""
+    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
+    path = tmp_path / "own.toml"
+    path.write_text(EQUATIONS, encoding="utf-8")
+    table = recorded(2, noise=0.0)
+    table["alpha_rad"] -= TRIM[0]
+    table["elevator_rad"] += 0.04
+    right = host.predict(path, table, from_s=1.0, to_s=2.5, constants=False)
+    table.loc[table["t_s"].between(0.99, 1.03), "alpha_rad"] = 0.3
+    found = host.predict(path, table, from_s=1.0, to_s=2.5, constants=False)
+    [one], [other] = (p.simulations[0].models[0].simulated for p in (right, found))
+    assert 0.0 < np.max(np.abs(other - one)) < 0.5  # 2 from one sample
+    assert "nothing fitted: from the mean of the 0.3 s" in found.to_text()
+
+
 def test_theil_is_what_its_definition_says() -> None:
     rng = np.random.default_rng(3)
     z, y = rng.standard_normal((200, 1)) + 2.0, 0.5 * rng.standard_normal((200, 1)) + 1.0

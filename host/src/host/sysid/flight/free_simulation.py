@@ -204,12 +204,14 @@ def _fitted_run(frozen: LinearModel, maneuver: Maneuver) -> FreeRun:
 def _trimmed_run(frozen: LinearModel, maneuver: Maneuver) -> FreeRun:
     """Run from equilibrium at the mean of the first moment, at rest before the input.
 
-    Equations of a user start from their first guess.
+    Equations of a user start from their first guess at that mean.
     """
-    if isinstance(frozen, NonlinearModel):
-        return _run_of(frozen, maneuver, output_problem(frozen, [maneuver]).first_guess())
     lead = slice(0, max(1, round(LEAD_S / maneuver.dt_s)))
     y, u = maneuver.outputs[lead].mean(axis=0), maneuver.inputs[lead].mean(axis=0)
+    if isinstance(frozen, NonlinearModel):
+        controls, outputs = (np.tile(mean, (maneuver.samples, 1)) for mean in (u, y))
+        at_rest = Maneuver(maneuver.dt_s, controls, outputs, name=maneuver.name)
+        return _run_of(frozen, maneuver, output_problem(frozen, [at_rest]).first_guess())
     known = dict(frozen.known_starts)
     x = np.array(
         [

@@ -4,28 +4,36 @@ from __future__ import annotations
 
 from typing import Any
 
+from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.pipeline.simulation import SimulatedModel, Simulation
 
 
 def simulation_lines(one: Simulation, source: str, *, constants: bool) -> list[str]:
     """Return the figures of every model over one record, free and one-step under own headings."""
-    held = (
-        "biases and start states fitted to each maneuver"
-        if constants
-        else "nothing fitted: equilibrium in the 0.3 s before each input"
-    )
     lines = [f"note: {note}" for note in one.notes]
     for m in one.models:
         count = len(m.maneuvers)
         lines += [
             f"{m.label} of {source} over {one.source}: {count} maneuver{'s' * (count > 1)},"
-            f" derivatives held, {held}",
+            f" derivatives held, {_held(m, constants=constants)}",
             *(f"  {maneuver.name}" for maneuver in m.maneuvers),
             *_free_lines(m),
             *_one_step_lines(m),
             *_window_lines(m),
         ]
     return lines
+
+
+def _held(m: SimulatedModel, *, constants: bool) -> str:
+    """Return what else of a model was fitted, or what stands in its place."""
+    if constants:
+        return "biases and start states fitted to each maneuver"
+    if isinstance(m.model, NonlinearModel):
+        return (
+            "nothing fitted: from the mean of the 0.3 s before each input, parameters of each"
+            " record at their start values"
+        )
+    return "nothing fitted: equilibrium in the 0.3 s before each input"
 
 
 def _free_lines(m: SimulatedModel) -> list[str]:

@@ -211,10 +211,10 @@ def simulate(
 
 
 def _without_maneuver(flight: ReconstructedFlight, axes: Sequence[str]) -> str:
-    there = ", ".join(sorted({f.axis for f in flight.maneuvers})) or "none at all"
+    there = ", ".join(sorted({f.axis for f in flight.maneuvers}))
     return (
-        f"no maneuver of {', '.join(axes)}; found only {there}; argument from_s and argument to_s"
-        " take any stretch"
+        f"no maneuver of {', '.join(axes)}; found {f'only {there}' if there else 'none'};"
+        " argument from_s and argument to_s take any stretch"
     )
 
 
