@@ -25,6 +25,7 @@ from host.sysid.models.diagnostics import (
     whiteness,
 )
 from host.sysid.models.modal_analysis import modes, modes_of
+from host.sysid.models.model_file import model_from
 from host.sysid.models.state_space_model import Parameter, Term
 from host.sysid.models.templates import Trim
 from scipy import signal, stats
@@ -181,6 +182,27 @@ def test_small_parameters_are_measured_by_what_would_matter() -> None:
     assert reference[model.parameter_names.index("a33")] == pytest.approx(abs(A[2, 2]))
     plain = reference_values(model, [maneuver], theta, small_share=0.0)
     np.testing.assert_array_equal(plain, np.abs(theta))
+
+
+def test_a_state_that_nobody_measured_sets_no_scale() -> None:
+    """Of a user's `w` the unit is not known: M_q and M_de were "small" beside it."""
+    model = model_from(
+        {
+            "name": "hidden",
+            "states": ["w", "q_radps"],
+            "inputs": ["elevator_rad"],
+            "outputs": ["q_radps"],
+            "delays": [],
+            "A": [[-4.0, 1.0], ["M_alpha", "M_q"]],
+            "B": [[0.0], ["M_de"]],
+            "parameters": {"M_alpha": -50.0, "M_q": -6.0, "M_de": -40.0},
+        }
+    )
+    t = np.arange(400) * 0.02
+    wave = np.sin(3.0 * t)[:, None]
+    maneuver = Maneuver(0.02, 0.05 * wave, 0.2 * np.roll(wave, 20, axis=0))
+    values = reference_values(model, [maneuver], model.start)
+    np.testing.assert_array_equal(values, np.abs(model.start))
 
 
 def test_an_input_that_repeats_another_is_named_as_collinear() -> None:

@@ -168,13 +168,15 @@ def _reference_values(model: LinearModel, spread: Array, theta: Array, small_sha
 
 
 def regressor_rms(model: LinearModel, maneuvers: Sequence[Maneuver]) -> Array:
-    """Return the rms about the mean of every state (where measured) and input."""
+    """Return the rms about the mean of every state and input; 0 of a state that nobody measured.
+
+    Its unit and size are the model's own: it sets no scale for the others of an equation.
+    """
     columns = []
     for source, names in (("outputs", model.states), ("inputs", model.inputs)):
         for position, name in enumerate(names):
             if source == "outputs" and name not in model.outputs:
-                # A flow angle that nobody measured is far below 1 rad: it sets no scale.
-                columns.append(0.0 if name in ("alpha_rad", "beta_rad") else 1.0)
+                columns.append(0.0)
                 continue
             index = model.outputs.index(name) if source == "outputs" else position
             power = np.concatenate(
