@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
-
 from host.sysid.numerics.first_order_filter import first_order_filter
+from scipy.signal import lfilter
 
 
 @pytest.mark.parametrize("shape", [(300,), (300, 3), (1,), (2, 2)])
