@@ -58,8 +58,6 @@ def fit_extended_equations(
     n, common = len(model.states), layout.common
     problem = NonlinearProblem(model, maneuvers)
     guess = problem.first_guess()
-    if problem.outputs(guess) is None:
-        problem.substeps = 1
     deviation = noise_deviation(maneuvers) if noise is None else np.asarray(noise)
     spread = np.array(
         [
@@ -74,6 +72,7 @@ def fit_extended_equations(
     z, P = np.zeros(0), np.zeros((0, 0))
     for _ in range(PASSES):
         began, known = shared, np.diag(layout.sd[:common] ** 2)  # data must not be counted twice
+        problem.refine_step(np.concatenate([shared, guess[common:]]))
         residuals, white = [], []
         for number in range(len(maneuvers)):
             z = np.concatenate([np.zeros(n), shared, layout.start[common:]])

@@ -244,6 +244,7 @@ def _states(frozen: LinearModel, maneuver: Maneuver, theta: Array) -> Array:
     """Return the states of the run with constants `theta`, (samples, n)."""
     problem = output_problem(frozen, [maneuver])
     if isinstance(problem, NonlinearProblem):
+        problem.choose_step(theta)
         run = problem.simulated(theta, problem.substeps, problem.ramp)
         return np.full((maneuver.samples, len(frozen.states)), np.nan) if run is None else run[0][1]
     n, m = len(frozen.states), len(frozen.inputs)

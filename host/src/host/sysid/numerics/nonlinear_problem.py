@@ -46,7 +46,7 @@ class NonlinearProblem(OutputProblem):
     Attributes
     ----------
     substeps : int
-        Runge-Kutta steps from sample to sample; found at the start values.
+        Runge-Kutta steps from sample to sample; found at the start values, and where a search ends.
     """
 
     def __init__(self, model: NonlinearModel, maneuvers: Sequence[Maneuver]) -> None:
@@ -210,24 +210,35 @@ class NonlinearProblem(OutputProblem):
 
     def choose_step(self, theta: Array) -> None:
         """Halve the step until that moves no output any more; once, where the model is finite."""
-        if self._stepped:
-            return
+        if not self._stepped:
+            self.refine_step(theta)
+
+    def refine_step(self, theta: Array) -> bool:
+        """Halve the step until that moves no output here; return whether it was too long.
+
+        A model may be stiffer where a search ends than where it began.
+        """
         spread = np.std(np.hstack([part.measured for part in self._parts]), axis=1)
         limit = STEP_TOLERANCE * np.maximum(spread, np.sqrt(self.least_variance))
-        coarse = self.simulated(theta, self.substeps, self.ramp)
-        while self.substeps < MOST_SUBSTEPS:
-            fine = self.simulated(theta, 2 * self.substeps, self.ramp)
+        substeps = self.substeps
+        coarse = self.simulated(theta, substeps, self.ramp)
+        compared = False
+        while substeps < MOST_SUBSTEPS:
+            fine = self.simulated(theta, 2 * substeps, self.ramp)
             if fine is not None and coarse is not None:
-                self._stepped = True
+                compared = True
                 moved = [
                     np.max(np.abs(a - b), axis=1)
                     for (a, _), (b, _) in zip(coarse, fine, strict=True)
                 ]
                 if np.all(np.max(moved, axis=0) <= limit):
-                    return
-            coarse, self.substeps = fine, 2 * self.substeps
-        if not self._stepped:
-            self.substeps = 1
+                    break
+            coarse, substeps = fine, 2 * substeps
+        if not compared or substeps == self.substeps:
+            self._stepped |= compared
+            return False
+        self._stepped, self.substeps = True, substeps
+        return True
 
 
 def finite(run: Callable[..., bool], *given: object) -> bool:

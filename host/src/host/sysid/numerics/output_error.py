@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -89,12 +90,15 @@ def minimise(
         If the response at the start diverges.
     """
     ar_models = list(noise) if noise is not None else [ArNoise.white()] * len(problem.model.outputs)
-    found = gauss_newton(
+    search = partial(
+        gauss_newton,
         _OutputError(problem, ar_models, variance),
-        np.clip(theta, problem.lower, problem.upper),
         max_iterations=max_iterations,
         step_limit=step_limit,
     )
+    found = search(np.clip(theta, problem.lower, problem.upper))
+    while found is not None and problem.refine_step(found.theta):
+        found = search(found.theta) or found
     if found is None:
         raise IdentificationError(
             f"model {problem.model.name} diverges at its start values; give other start values"

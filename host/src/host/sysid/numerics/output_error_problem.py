@@ -297,6 +297,10 @@ class OutputProblem:
             result.append(Response(y, slope))
         return result
 
+    def refine_step(self, theta: Array) -> bool:
+        """Return whether steps between samples were too long here; a linear model takes none."""
+        return False
+
     def release(self, responses: Sequence[Response]) -> None:
         """Take back the sensitivities of responses that are no longer needed.
 
