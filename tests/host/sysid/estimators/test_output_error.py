@@ -19,7 +19,7 @@ def test_optimum_equals_scipy_least_squares() -> None:
     problem = OutputProblem(navion_free(), [noisy(11)])
     ours = minimise(problem, start_values(problem))
     assert ours.converged
-    bound = np.sqrt(np.diag(covariance_of_free(ours.information, ours.free)))
+    bound = np.sqrt(np.diag(covariance_of_free(ours.information, ours.free, problem.names)))
     weight = 1.0 / np.sqrt(ours.variance)[:, None]
 
     def residual(theta: np.ndarray) -> np.ndarray:
@@ -37,7 +37,7 @@ def test_errors_reach_the_bound_and_a_wrong_bound_shows() -> None:
     for seed in range(120):
         problem = OutputProblem(model, [noisy(1000 + seed)])
         found = minimise(problem, start_values(problem))
-        bound = np.sqrt(np.diag(covariance_of_free(found.information, found.free)))
+        bound = np.sqrt(np.diag(covariance_of_free(found.information, found.free, problem.names)))
         ratios.append((found.theta - np.concatenate([TRUTH, np.zeros(4)])) / bound)
     rms = np.sqrt(np.mean(np.square(ratios), axis=0))
     # 120 runs scatter by 1/sqrt(240) = 6.5 %; four of those for the worst of fourteen.

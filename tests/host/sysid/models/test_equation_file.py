@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.sysid.estimators.output_error_fit import fit_output_error
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.equation_text import equation_text
 from host.sysid.models.maneuver import Maneuver
@@ -107,6 +108,31 @@ def test_what_is_written_is_read_again(tmp_path: Path) -> None:
     assert equation_text(again) == equation_text(model)
 
 
+def test_a_first_guess_needs_a_value_where_it_was_measured_only(tmp_path: Path) -> None:
+    """A speed of 1 m/s stood for every column, and the root had none."""
+    model = read(tmp_path, TEXT.replace('"0.1*alpha_rad + ', '"sqrt(thrust_n - 4) + '))
+    assert model.source.first_states({"alpha_rad": 0.1, "thrust_n": 13.0})["q_radps"] == 3.0
+    with pytest.raises(IdentificationError, match=r"starts.q_radps: has no finite .*sqrt\(-1\)"):
+        model.source.first_states({"alpha_rad": 0.1, "thrust_n": 3.0})
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("V = 17.0", "V = 0.0", r"rates.alpha_rad has no finite value.*: 0.02 / 0, at the start"),
+        ('"V*lift"', '"V*lift + sqrt(alpha_rad - 1)"', r"outputs.az_mps2 has .*: sqrt\(-0.8\)"),
+        ("stall(alpha_rad))", "log(stall(alpha_rad)))", r"rates.alpha_rad has .*: log\(0\)"),
+    ],
+)
+def test_equations_without_a_value_at_the_start_are_named(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    text = TEXT.replace("y = [0.0, 0.1", "y = [-0.1, 0.0").replace(old, new)
+    data = Maneuver(0.02, np.full((50, 2), 2.0), np.full((50, 2), 0.2))
+    with pytest.raises(IdentificationError, match=said):
+        fit_output_error(read(tmp_path, text), [data], coloured_noise=False)
+
+
 def test_inputs_between_samples_are_what_the_file_says(tmp_path: Path) -> None:
     """Measured columns have noise: they stay as they are."""
     smooth = read(tmp_path, 'hold = "smooth"\n' + TEXT)
@@ -122,9 +148,23 @@ def test_inputs_between_samples_are_what_the_file_says(tmp_path: Path) -> None:
         ("sin(alpha_rad)", "sin(alpha_rad", "line 11: rates.q_radps: column "),
         ("(1 - stall", "(1 - __import__", "line 8: definitions.lift: column 19: '__import__' is"),
         ("V = 17.0", 'V = "x"', "line 6: constants.V is 'x', expected a number"),
+        ('lift = "', 'lift = "drag + ', "line 8: definitions.lift: column 1: 'drag' is no name"),
+        ('lift = "', 'lift = "lift + ', "line 8: definitions.lift: made of itself"),
+        ('lift = "', 'drag = "lift"\nlift = "', "line 8: definitions.drag: made of lift, which st"),
+        (
+            "prior_sd = 3.0",
+            "min = 3.0",
+            "known are start, lower, upper, prior_sd, each_record, unit",
+        ),
+        ('kind = "equations"', 'kind = "equation"', ': [rates] are of equations; write kind = "e'),
+        ('kind = "equations"', "", ': [rates] are of equations; write kind = "equations"'),
         ("upper = 0.0", "upper = -9.0", "line 16: parameters.Za: start -5 is not between"),
         ("Ma = -90.0", "Ma = -90.0\nidle = 1.0", "line 18: parameters.idle: enters no expression"),
-        ("Ma = -90.0", "Ma = -90.0\nV = 1.0", ": V is named twice"),
+        (
+            "Ma = -90.0",
+            "Ma = -90.0\nV = 1.0",
+            ": V is named twice: as a parameter and as a constant",
+        ),
         ("Ma = -90.0", "Ma = -90.0\nsin = 1.0", "line 18: parameters.sin: the name of a function"),
         ("x = [0.0, 0.2, 0.3]", "x = [0.0, 0.3, 0.2]", "line 21: tables.stall: x must rise"),
         ("x = [0.0, 0.2, 0.3]", "x = [0.0, 0.2]", "line 21: tables.stall: 2 points of x, 3 of y"),

@@ -13,6 +13,7 @@ from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model_file import read_model
 from host.sysid.numerics.nonlinear_problem import output_problem
+from scipy import integrate
 
 import host
 
@@ -108,3 +109,50 @@ def test_a_method_of_linear_models_is_refused(tmp_path: Path, method: str) -> No
     table = flown(model)[0].assign(airspeed_mps=17.0)
     with pytest.raises(IdentificationError, match=r"pitch with a bend.* has equations"):
         host.identify(table, models=model, methods=method, from_s=0.0, to_s=5.0)
+
+
+def swinging() -> tuple[str, pd.DataFrame]:
+    """Return a pendulum of no input, and a record of it."""
+    text = """\
+kind = "equations"
+[rates]
+phi_rad = "p_radps"
+p_radps = "-stiffness*sin(phi_rad) - damping*p_radps"
+[outputs]
+phi_rad = "phi_rad"
+[parameters]
+stiffness = 20.0
+damping = 0.2
+"""
+    t = np.arange(150) * DT_S
+    path = integrate.solve_ivp(
+        lambda _, x: [x[1], -25.0 * np.sin(x[0]) - 0.4 * x[1]], (0.0, t[-1]), [0.8, 0.0],
+        t_eval=t, rtol=1e-9, atol=1e-9,
+    )  # fmt: skip
+    noise = np.random.default_rng(2).standard_normal(150) * 0.003
+    return text, pd.DataFrame({"t_s": t, "phi_rad": path.y[0] + noise})
+
+
+def test_a_model_without_inputs_is_fitted_to_a_stretch(tmp_path: Path) -> None:
+    """It was an internal error."""
+    text, record = swinging()
+    model = tmp_path / "pendulum.toml"
+    model.write_text(text, encoding="utf-8")
+    answer = host.identify(record, models=model, methods="output-error-white", from_s=0.0, to_s=6.0)
+    result = answer.linear[0].result
+    half = result.half_width()
+    for name, value in (("stiffness", 25.0), ("damping", 0.4)):
+        k = result.index(name)
+        assert abs(result.estimate[k] - value) < 1.5 * half[k] < 0.2 * value, name
+
+
+def test_a_parameter_that_acts_on_nothing_is_named(tmp_path: Path) -> None:
+    text, record = swinging()
+    model = tmp_path / "pendulum.toml"
+    stop = " - stop*max(0, phi_rad - 2)"
+    model.write_text(
+        text.replace('damping*p_radps"', f'damping*p_radps{stop}"') + "stop = 9\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(IdentificationError, match="stop acts on no output in these maneuvers"):
+        host.identify(record, models=model, methods="output-error-white", from_s=0.0, to_s=6.0)

@@ -58,6 +58,7 @@ def fit_extended_equations(
     n, common = len(model.states), layout.common
     problem = NonlinearProblem(model, maneuvers)
     guess = problem.first_guess()
+    problem.check_start(guess)
     deviation = noise_deviation(maneuvers) if noise is None else np.asarray(noise)
     spread = np.array(
         [

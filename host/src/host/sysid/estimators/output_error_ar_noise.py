@@ -162,7 +162,7 @@ def _covariance(
     problem: OutputProblem, optimum: Optimum, noise: Sequence[ArNoise], variance: Array
 ) -> Array:
     information, _ = _information(problem, optimum, noise, variance)
-    return covariance_of_free(information, optimum.free)
+    return covariance_of_free(information, optimum.free, problem.names)
 
 
 def _innovation_variances(
@@ -171,7 +171,7 @@ def _innovation_variances(
     """Return unbiased innovation variances; each output loses its share of the parameters."""
     for _ in range(3):
         information, slopes = _information(problem, optimum, noise, variance)
-        covariance = covariance_of_free(information, optimum.free)
+        covariance = covariance_of_free(information, optimum.free, problem.names)
         updated = np.zeros(len(noise))
         for j, memory in enumerate(noise):
             squares, share = 0.0, 0.0
@@ -210,7 +210,7 @@ def _fit_ar_models(
     memory = list(noise)
     for round_number in range(MOMENT_ROUNDS):
         information, _ = _information(problem, optimum, memory, variance)
-        covariance = covariance_of_free(information, optimum.free)
+        covariance = covariance_of_free(information, optimum.free, problem.names)
         lower = _matrix_root(covariance)
         updated, change = [], 0.0
         variance = variance.copy()

@@ -69,6 +69,7 @@ def fit_output_error(
         raise IdentificationError(
             f"{len(first)} start values, {len(problem.names)} needed: {', '.join(problem.names)}"
         )
+    problem.check_start(first)
     fit = fit_with_ar_noise(
         problem,
         first,

@@ -47,7 +47,8 @@ def fitted_and_held_out(
     every = [f for flight in flights for f in flight.maneuvers]
     if not every and not any(axis in one.recorded for one in flights for axis in SURFACES):
         raise NoManeuverError(
-            f"no column of a surface ({', '.join(SURFACES)}); name one in a map (argument mapping)"
+            f"no column of a surface ({', '.join(SURFACES)}); name one in a map (argument mapping),"
+            " or give a stretch (argument from_s, argument to_s)"
         )
     if not every:
         raise NoManeuverError(

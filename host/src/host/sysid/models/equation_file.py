@@ -44,7 +44,7 @@ from host.sysid.identification_error import IdentificationError
 from host.sysid.models.file_parts import delays_from, names_from, parameter_from, table_from
 from host.sysid.models.model_constants import ModelConstants, read_constants, read_noise
 from host.sysid.models.nonlinear_model import Equations, NonlinearModel, no_tangent
-from host.sysid.models.state_space_model import DelayGroup, Parameter
+from host.sysid.models.state_space_model import CONSTANT, DelayGroup, Parameter
 from host.text import shown as in_a_line
 
 KIND = "equations"
@@ -58,6 +58,7 @@ KEYS = (
 MOST = {"rates": 24, "outputs": 30, "definitions": 200, "parameters": 100, "constants": 200,
         "tables": 50, "starts": 24}  # fmt: skip
 MOST_INPUTS = 30
+OF_PARAMETER = ("start", "lower", "upper", "prior_sd", "each_record", "unit")
 MOST_POINTS = 1000
 LONGEST_NAME = 60
 _PLACE = re.compile(r"\[?(\w+)\]?(?:\.(\w+))?")
@@ -102,6 +103,8 @@ def equations_from(document: Mapping[str, object], name: str = "model") -> Nonli
     for key in ("rates", "outputs"):
         if not texts[key]:
             raise IdentificationError(f"[{key}] is missing: a name = an expression, at least one")
+    if not inputs and not columns:
+        columns = (CONSTANT,)  # free motion
     if len(inputs) + len(columns) > MOST_INPUTS:
         raise IdentificationError(f"more than {MOST_INPUTS} inputs and columns")
     states = tuple(name for name, _ in texts["rates"])
@@ -115,9 +118,15 @@ def equations_from(document: Mapping[str, object], name: str = "model") -> Nonli
     defined = tuple(name for name, _ in texts["definitions"])
     # An output may have the name of a state or of what it measures; nothing else twice.
     _refuse_twice(
-        [*states, *inputs, *columns, *(p.name for p in (*parameters, *own)), *defined]
-        + [name for name, _ in constants]
-        + [name for name, _, _ in tables]
+        {
+            "a state": states,
+            "an input": inputs,
+            "a measured column": columns,
+            "a parameter": [p.name for p in (*parameters, *own)],
+            "a definition": defined,
+            "a constant": [name for name, _ in constants],
+            "a table": [name for name, _, _ in tables],
+        }
     )
     strangers = sorted({name for name, _ in texts["starts"]} - set(states))
     if strangers:
@@ -143,7 +152,7 @@ def equations_from(document: Mapping[str, object], name: str = "model") -> Nonli
     if idle:
         raise IdentificationError(f"parameters.{idle[0]}: enters no expression")
     equations.text()  # what is too large with its slopes is refused now
-    equations.first_states(dict.fromkeys((*equations.inputs, *outputs), 1.0))
+    equations.check_starts()
     zero = no_tangent(equations)
     hold = str(document.get("hold", LINE))
     if hold not in HOLDS:
@@ -206,7 +215,9 @@ def _parameters(
     own: list[Parameter] = []
     for name, value in _section(document, "parameters").items():
         where = f"parameters.{name}"
-        settings = dict(value) if isinstance(value, dict) else {"start": value}
+        settings = dict(
+            table_from(value if isinstance(value, dict) else {"start": value}, OF_PARAMETER, where)
+        )
         each = settings.pop("each_record", False)
         unit = settings.pop("unit", "")
         if not isinstance(each, bool) or not isinstance(unit, str) or len(unit) > LONGEST_NAME:
@@ -286,12 +297,13 @@ def _delays(document: Mapping[str, object], used: list[str]) -> tuple[DelayGroup
     return delays_from(document["delays"], used, "") if "delays" in document else ()
 
 
-def _refuse_twice(names: Collection[str]) -> None:
-    seen: set[str] = set()
-    for name in names:
-        if name in seen:
-            raise IdentificationError(f"{name} is named twice: as state, input, parameter or other")
-        seen.add(name)
+def _refuse_twice(named: Mapping[str, Collection[str]]) -> None:
+    seen: dict[str, str] = {}
+    for kind, names in named.items():
+        for name in names:
+            if name in seen:
+                raise IdentificationError(f"{name} is named twice: as {seen[name]} and as {kind}")
+            seen[name] = kind
 
 
 def _line_of(message: str, text: str) -> str:

@@ -99,6 +99,8 @@ def read_model(path: Path) -> LinearModel:
     document = read_document(path)
     if document.get("kind") == KIND:
         return read_equations(path)
+    if "rates" in document:
+        raise IdentificationError(f'{path}: [rates] are of equations; write kind = "{KIND}" above')
     return model_from(document, str(path))
 
 

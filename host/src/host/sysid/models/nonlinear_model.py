@@ -9,7 +9,7 @@ same signals, parameters and constants to first order about a mean condition, A(
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -19,7 +19,7 @@ from host.arrays import Array
 from host.sysid.expressions.equation_code import EquationCode, EquationNodes
 from host.sysid.expressions.evaluation import evaluate
 from host.sysid.expressions.expression_graph import ExpressionError, ExpressionGraph
-from host.sysid.expressions.grammar import parse_expression
+from host.sysid.expressions.grammar import NAME, parse_expression
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
 
@@ -108,16 +108,54 @@ class Equations:
         measured : mapping
             Inputs and outputs at the first sample.
         """
-        graph = ExpressionGraph()
+        graph, nodes = _starts(self)
         known = dict(self.constants) | dict(measured)
-        names = {name: graph.variable(name) for name in known}
         found = {}
-        for state, text in self.starts:
+        for state, node in nodes.items():
             try:
-                found[state] = evaluate(graph, parse_expression(text, graph, names), known)
+                found[state] = evaluate(graph, node, known)
             except ExpressionError as error:
                 raise ExpressionError(f"starts.{state}: {error}") from None
         return found
+
+    def check_starts(self) -> None:
+        """Read the first guesses of initial states.
+
+        Raises
+        ------
+        ExpressionError
+            If one is no expression of what is measured.
+        """
+        _starts(self)
+
+    def check_first_sample(
+        self, x: Sequence[float], u: Sequence[float], p: Sequence[float]
+    ) -> None:
+        """Try rates and outputs at one sample, without code being made.
+
+        Parameters
+        ----------
+        x, u, p : sequence of float
+            States, inputs and parameters.
+
+        Raises
+        ------
+        ExpressionError
+            If one has no finite value there; the line names it and the part of it that has none.
+        """
+        nodes = self.nodes()
+        values = dict(self.constants)
+        for names, numbers in ((self.states, x), (self.inputs, u), (self.parameters, p)):
+            values |= dict(zip(names, numbers, strict=True))
+        for kind, named, found in (
+            ("rates", self.rates, nodes.rates),
+            ("outputs", self.outputs, nodes.outputs),
+        ):
+            for (name, _), node in zip(named, found, strict=True):
+                try:
+                    evaluate(nodes.graph, node, values, nodes.tables)
+                except ExpressionError as error:
+                    raise ExpressionError(f"{kind}.{name} {error}") from None
 
 
 @lru_cache(maxsize=16)
@@ -129,8 +167,10 @@ def _nodes(equations: Equations) -> EquationNodes:
         name: graph.variable(name) for name in (*e.states, *e.inputs, *e.parameters, *constants)
     }
     for kind, named in (("definitions", e.definitions), ("rates", e.rates), ("outputs", e.outputs)):
-        for name, text in named:
+        for number, (name, text) in enumerate(named):
             try:
+                if kind == "definitions":
+                    _refuse_later(text, name, [later for later, _ in named[number:]])
                 node = parse_expression(text, graph, names, tables)
             except ExpressionError as error:
                 raise ExpressionError(f"{kind}.{name}: {error}") from None
@@ -148,6 +188,33 @@ def _nodes(equations: Equations) -> EquationNodes:
         constants=constants,
         tables=tables,
     )
+
+
+def _refuse_later(text: str, name: str, later: Sequence[str]) -> None:
+    """Refuse a definition that is made of itself, or of one below it."""
+    for other in NAME.findall(text):
+        if other in later:
+            what = "itself" if other == name else f"{other}, which stands below it"
+            raise ExpressionError(f"made of {what}; a definition knows those above it")
+
+
+@lru_cache(maxsize=16)
+def _starts(equations: Equations) -> tuple[ExpressionGraph, dict[str, int]]:
+    """Return the first guess of the initial states that have one, as nodes of a graph."""
+    graph = ExpressionGraph()
+    constants = (name for name, _ in equations.constants)
+    outputs = (name for name, _ in equations.outputs)
+    known = {name: graph.variable(name) for name in (*constants, *equations.inputs, *outputs)}
+    found = {}
+    for state, text in equations.starts:
+        try:
+            found[state] = parse_expression(text, graph, known)
+        except ExpressionError as error:
+            raise ExpressionError(
+                f"starts.{state}: {error} (a start knows constants, and inputs, columns and"
+                " outputs as they were measured)"
+            ) from None
+    return graph, found
 
 
 @lru_cache(maxsize=16)

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
+from host.sysid.expressions.expression_graph import ExpressionError
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel
@@ -103,6 +105,27 @@ class NonlinearProblem(OutputProblem):
             own = part.index[self.first_own :]
             theta[own] = [p.start for p in model.own_parameters]
         return theta
+
+    def check_start(self, theta: Array) -> None:
+        """Try the equations at the first sample of every maneuver, before code is made of them.
+
+        Raises
+        ------
+        IdentificationError
+            If one has no finite value; the line names it.
+        """
+        for number, maneuver in enumerate(self.maneuvers):
+            g = self.given(number, theta)
+            try:
+                self.source.check_first_sample(
+                    g.start.tolist(),
+                    maneuver.inputs[0].tolist(),
+                    g.parameters[: len(self.source.parameters)].tolist(),
+                )
+            except ExpressionError as error:
+                raise IdentificationError(
+                    f"{error}, at the start values of model {self.model.name}"
+                ) from None
 
     def respond(self, theta: Array) -> list[Response] | None:
         """Simulate every maneuver with sensitivities; None if a response diverges."""

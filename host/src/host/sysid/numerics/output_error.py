@@ -20,6 +20,7 @@ from host.sysid.numerics.gauss_newton import (
 from host.sysid.numerics.output_error_problem import OutputProblem, Response
 
 MAX_ITERATIONS = 60
+MOST_NAMED = 5
 SINGULAR = 1e-15  # of the largest eigenvalue of the scaled information
 UNIDENTIFIABLE = 1e-12  # the same: below it a product of two inverses has no correct digit
 
@@ -158,21 +159,25 @@ def whitened_sensitivities(
     return result
 
 
-def covariance_of_free(information: Array, free: BoolArray) -> Array:
+def covariance_of_free(information: Array, free: BoolArray, names: Sequence[str]) -> Array:
     """Return the Cramer-Rao covariance over the free parameters; that of others is zero.
 
     Raises
     ------
     IdentificationError
-        If a parameter acts on no output at all.
+        If a parameter acts on no output at all; the line names it.
     """
     covariance = np.zeros_like(information)
     if not free.any():
         return covariance
     block = information[np.ix_(free, free)]
     scale = np.sqrt(np.maximum(np.diag(block), 0.0))
-    if np.any(scale == 0.0):
-        raise IdentificationError("singular information: a parameter does not act on any output")
+    idle = [names[k] for k in np.flatnonzero(free)[scale == 0.0]]
+    if idle:
+        raise IdentificationError(
+            f"singular information: {', '.join(idle[:MOST_NAMED])} acts on no output in these"
+            " maneuvers; make it known, give it a prior, or fly where it acts"
+        )
     value, vector = np.linalg.eigh(block / np.outer(scale, scale))
     # Directions without information get a huge variance, not an exception: they are flagged later.
     value = np.maximum(value, SINGULAR * value[-1])

@@ -297,6 +297,9 @@ class OutputProblem:
             result.append(Response(y, slope))
         return result
 
+    def check_start(self, theta: Array) -> None:
+        """Refuse a start where equations have no value; a linear model has one everywhere."""
+
     def refine_step(self, theta: Array) -> bool:
         """Return whether steps between samples were too long here; a linear model takes none."""
         return False
