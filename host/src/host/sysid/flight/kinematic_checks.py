@@ -300,7 +300,7 @@ def _wind_angles(
                 explained_share=WIND_ANGLE_EXPLAINED,
             )
         else:
-            made = (alpha, m.get("elevator_rad", zero))
+            made = _lift_and_weight(m, alpha, phi)
             yield _law("alpha_rad", m, {"q_radps": pitch}, made)
     if "beta_rad" in m and "r_radps" in m:
         if known and "ay_mps2" in m:
@@ -317,6 +317,22 @@ def _wind_angles(
             )
         else:
             yield _law("beta_rad", m, {"r_radps": yaw}, (beta, phi, m.get("rudder_rad", zero)))
+
+
+def _lift_and_weight(m: Mapping[str, Array], alpha: Array, phi: Array) -> tuple[Array, ...]:
+    """Return what turns the path where no force was measured, but for factors.
+
+    In a slow exchange of height and speed q follows the path, and alpha moves as speed lets lift
+    and weight differ. Without an airspeed its changes are those of height, of about one slope.
+    """
+    elevator = m.get("elevator_rad", np.zeros(len(alpha)))
+    step_s = np.gradient(m["t_s"])
+    theta = m["theta_rad"] if "theta_rad" in m else np.cumsum(m["q_radps"] * step_s)
+    if "airspeed_mps" in m:
+        speed = np.maximum(m["airspeed_mps"], 1.0)
+        weight = np.cos(theta - alpha) * np.cos(phi) / speed
+        return speed, speed * alpha, speed * elevator, weight
+    return alpha, elevator, m["t_s"], np.cumsum((theta - alpha) * step_s)
 
 
 def _slow(m: Mapping[str, Array]) -> Iterator[Identity]:
