@@ -100,10 +100,13 @@ def test_a_bank_loop_whose_command_jumps_is_named_and_takes_nothing(seed: int) -
     assert found_in(flown("lateral", inputs, None, seed)) == []
 
 
-@pytest.mark.parametrize("seed", [19500, 19502])
-def test_a_tracker_is_named_where_heading_is_no_column(seed: int) -> None:
-    """The rates tell it, but for a drift; without them bank alone is no law."""
-    columns = tracked(seed, leg_s=12.0)
+@pytest.mark.parametrize(("seed", "leg_s"), [(19500, 12.0), (19502, 12.0), (19500, 4.0)])
+def test_a_tracker_is_named_where_heading_is_no_column(seed: int, leg_s: float) -> None:
+    """The rates tell it, but for a drift; without them bank alone is no law.
+
+    In legs of a few seconds bank is at its limit for one of them.
+    """
+    columns = tracked(seed, leg_s)
     [found] = found_in(columns)
     assert "psi_rad" in found.text.split(" at ")[0]
     assert found.text.endswith(" legs of constant command, heading by rates")

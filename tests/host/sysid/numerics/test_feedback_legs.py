@@ -6,7 +6,7 @@ from host.sysid.numerics.feedback_legs import SETTLING_S, feedback_legs
 from host.sysid.numerics.state_feedback import feedback_law
 
 DT_S, SAMPLES = 0.02, 3000
-TURNS_S, LIMITED_S = (12.0, 33.0, 47.0), 3.0
+TURNS_S = (12.0, 33.0, 47.0)
 GAINS = {"p": -0.06, "phi": -0.5, "psi": -0.6}
 
 
@@ -16,7 +16,7 @@ def noise(rng: np.random.Generator, width: int) -> np.ndarray:
     )
 
 
-def tracked(seed: int) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+def tracked(seed: int, limited_s: float) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Ailerons and signals; after each turn bank is at its limit and heading not followed."""
     rng = np.random.default_rng(seed)
     t = DT_S * np.arange(SAMPLES)
@@ -24,16 +24,17 @@ def tracked(seed: int) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     command, followed = np.zeros(SAMPLES), np.ones(SAMPLES)
     for turn_s, jump in zip(TURNS_S, (0.5, -0.8, 0.9), strict=True):
         command[t >= turn_s] += jump
-        limited = (t >= turn_s) & (t < turn_s + LIMITED_S)
+        limited = (t >= turn_s) & (t < turn_s + limited_s)
         followed[limited] = 0.0
         command[limited] += jump
     moved = sum(GAINS[n] * signals[n] * (followed if n == "psi" else 1.0) for n in GAINS)
     return np.roll(moved + command, 2) + 0.002 * rng.standard_normal(SAMPLES), signals
 
 
-@pytest.mark.parametrize("seed", [17718, 17719])
-def test_the_law_is_found_within_legs_and_not_without(seed: int) -> None:
-    moved, signals = tracked(seed)
+@pytest.mark.parametrize(("seed", "limited_s"), [(17718, 3.0), (17719, 3.0), (17718, 1.2)])
+def test_the_law_is_found_within_legs_and_not_without(seed: int, limited_s: float) -> None:
+    """Whether bank is at its limit for longer than the shortest leg or not."""
+    moved, signals = tracked(seed, limited_s)
     window = [np.arange(50, SAMPLES)]
     assert feedback_law(DT_S, moved, signals, window) is None
     inner = np.column_stack([signals["p"], signals["phi"]])
@@ -42,7 +43,7 @@ def test_the_law_is_found_within_legs_and_not_without(seed: int) -> None:
     for turn_s in TURNS_S:
         jump = round(turn_s / DT_S) + 2
         assert not any(leg[0] < jump <= leg[-1] for leg in legs)
-        inside = slice(jump + round(SETTLING_S / DT_S), jump + round((LIMITED_S - 0.2) / DT_S))
+        inside = slice(jump + round(SETTLING_S / DT_S), jump + round((limited_s - 0.2) / DT_S))
         assert np.ptp(resting[inside]) == 0.0
     law = feedback_law(DT_S, moved, signals | {"psi": resting}, legs)
     assert law is not None
@@ -51,7 +52,7 @@ def test_the_law_is_found_within_legs_and_not_without(seed: int) -> None:
 
 
 def test_windows_too_short_or_without_values_have_no_legs() -> None:
-    moved, signals = tracked(17720)
+    moved, signals = tracked(17720, 3.0)
     inner = np.column_stack([signals["p"], signals["phi"]])
     inner[490:510] = np.nan
     windows = [np.arange(50, 80), np.arange(500, 700)]
