@@ -21,6 +21,7 @@ from host.sysid.flight.flight_tables import read_flight_columns
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_selection import select_maneuvers
+from host.sysid.models.state_space_model import Term
 from studies.wrong_flights import fly
 
 from tests.host.logs import ROOT
@@ -183,6 +184,20 @@ def test_an_attitude_that_no_force_depends_on_takes_nothing(answer: Answer) -> N
     """Bank turns gravity only, and heading is no state: of both the gain is known."""
     for signal in ("phi_rad", "psi_rad"):
         assert not alike_derivatives(answer.model, Feedback("aileron_rad", (signal,), (-0.5,)))
+
+
+def test_all_parameters_at_one_place_are_alike(answer: Answer) -> None:
+    """A user's Cl_r acts on the yaw rate too where axes are no principal ones."""
+    yaw = answer.model.states.index("r_radps")
+    shared = Term("A", yaw, yaw, "L_r", 0.1)
+    law = Feedback("rudder_rad", ("r_radps",), (0.4,))
+    for terms in ((shared, *answer.model.terms), (*answer.model.terms, shared)):
+        model = replace(answer.model, terms=terms)
+        assert set(alike_derivatives(model, law)[-1]) == {"N_dr", "N_r", "L_r"}
+        told = combined_derivatives(
+            replace(answer, model=model), [Finding("feedback", (), "", feedback=law)]
+        )
+        assert "N_dr" not in " ".join(told)
 
 
 def test_what_the_pair_does_together_is_told(answer: Answer) -> None:

@@ -21,28 +21,31 @@ def feedback_of(findings: Iterable[Finding]) -> list[Feedback]:
 def alike_derivatives(model: LinearModel, law: Feedback) -> list[tuple[str, ...]]:
     """Return, of each equation that has both, the surface's derivative and those it is like.
 
+    In a user's model several parameters may act at one place: all of them are alike.
+
     A signal that is no state, or has no free derivative in an equation (gravity's bank angle),
     leaves the surface's derivative identifiable there.
     """
     found = []
     for row in range(len(model.states)):
-        own = _entries(model, "B", row, model.inputs, (law.surface,))
-        others = _entries(model, "A", row, model.states, law.signals)
-        if own and len(others) == len(law.signals):
-            found.append((*own, *others))
+        own = _entries(model, "B", row, model.inputs, law.surface)
+        others = [_entries(model, "A", row, model.states, name) for name in law.signals]
+        if own and all(others):
+            found.append(tuple(dict.fromkeys((*own, *(n for names in others for n in names)))))
     return found
 
 
 def combined_derivatives(answer: Answer, findings: Iterable[Finding]) -> list[str]:
     """Return lines with the sums of derivatives that a feedback law makes collinear.
 
-    A law with a lag or a wash-out leaves no such sum.
+    A law with a lag or a wash-out leaves no such sum, nor do several parameters at one place.
     """
     sums = [
         line
         for law in feedback_of(findings)
         if not law.filtered
         for own, *others in alike_derivatives(answer.model, law)
+        if len(others) == len(law.gains)
         for name, gain in zip(others, law.gains, strict=True)
         if (line := _known_sum(answer, name, gain, own))
     ]
@@ -64,10 +67,11 @@ def _known_sum(answer: Answer, name: str, gain: float, own: str) -> str:
 
 
 def _entries(
-    model: LinearModel, matrix: str, row: int, names: Sequence[str], signals: Sequence[str]
+    model: LinearModel, matrix: str, row: int, names: Sequence[str], signal: str
 ) -> list[str]:
-    """Return the parameter at each signal's place in a row, in the order of the signals."""
-    found = {
-        names[t.column]: t.parameter for t in model.terms if (t.matrix, t.row) == (matrix, row)
-    }
-    return [found[s] for s in signals if s in found]
+    """Return the parameters at a signal's place in a row."""
+    return [
+        t.parameter
+        for t in model.terms
+        if (t.matrix, t.row) == (matrix, row) and names[t.column] == signal
+    ]
