@@ -55,7 +55,11 @@ from host.sysid.flight.reconstructed_flight import (
     ReconstructedFlight,
     reconstruct_flight,
 )
-from host.sysid.flight.sampling_error import surfaces_known, with_moving_surfaces
+from host.sysid.flight.surface_motion import (
+    surfaces_bend,
+    surfaces_known,
+    with_moving_surfaces,
+)
 from host.sysid.flight.trim_departure import (
     NO_SPIN,
     Departure,
@@ -134,7 +138,9 @@ class LinearEstimator:
             used, held = brought_behind(used, servo.setting), brought_behind(held, servo.setting)
         if method == GUST and self.own is None:
             used = with_filter_step(used, model)
-        if self.own is None and surfaces_known(used):
+        if self.own is None and (
+            surfaces_known(used) or (servo is None and surfaces_bend(used, model, trim))
+        ):
             used, held = with_moving_surfaces(used), with_moving_surfaces(held)
         data = [m.cut(model) for m in used]
         cuts, departing = [m.inside() for m in used], [m.departing() for m in used]

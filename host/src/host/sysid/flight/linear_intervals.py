@@ -25,7 +25,8 @@ from host.sysid.flight.free_simulation import FreeResponses, free_responses
 from host.sysid.flight.linear_stages import LinearEstimate, LinearIntervals
 from host.sysid.flight.noise_model_limits import excess_over_noise_model
 from host.sysid.flight.pilot_takeover import taken_over
-from host.sysid.flight.sampling_error import hold_shift, kink_shift, surfaces_known
+from host.sysid.flight.sampling_error import hold_shift
+from host.sysid.flight.surface_motion import motion_shift, surfaces_known
 from host.sysid.flight.systematic_errors import add_systematic_covariance, systematic_error_shifts
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
@@ -154,8 +155,8 @@ def _shifts(
         share = airspeed_share(usual, e.condition.qbar_pa)
         shifts += airspeed_shift(statistical, e.maneuvers, e.trim, share)
     # Delays that were estimated have taken up half a sample, and their intervals count it.
-    if not own and surfaces_known(e.used):
-        shifts += kink_shift(statistical, e.maneuvers, e.used, e.trim)
-    elif own or not e.delays:
+    if not own and (surfaces_known(e.used) or e.delays):
+        shifts += motion_shift(statistical, e.maneuvers, e.used, e.trim)
+    else:
         shifts += hold_shift(statistical, e.maneuvers, e.trim)
     return shifts

@@ -6,7 +6,7 @@ share is one more parameter beside the estimate. A smooth input bends beside its
 jumps does so at an instant of its own. Where that moves the estimate by more than a tenth of an
 interval it is part of it. On records without noise it is most of it.
 
-Of an instrument that is known surfaces are measured: they move, kinks included (`input_kinks`).
+Surfaces that move between samples as servos do are those of `surface_motion`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from host.arrays import Array
 from host.constants import NORMAL_95
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
 from host.sysid.flight.one_step import OneStep, Step, one_step_of
-from host.sysid.flight.reconstructed_flight import FlownManeuver
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
@@ -39,9 +38,6 @@ ONE_STEP = 1.1  # times what one step of Gauss and Newton says: the next ones ma
 NORMAL_99 = 2.576
 ROUNDING = 1e-12  # of a variance
 EVENLY_SD = 1.0 / np.sqrt(3.0)  # of a jump at any instant between two samples
-# Of what kinks do to the estimate, one deviation: a servo of second order and 60 rad/s has none,
-# and passes for one of first order that does half as much.
-KINK_SHARE = 0.5
 
 
 def hold_shift(
@@ -127,42 +123,6 @@ def _log_odds(step: Step, prior_sd: Array, wider: float) -> float:
     value = np.clip(value, ROUNDING, 1.0)
     along = vector.T @ (step.added / prior_sd)
     return float(0.5 * np.sum(along**2 / value + np.log(value)))
-
-
-def surfaces_known(maneuvers: Sequence[FlownManeuver]) -> bool:
-    """Return whether a file says how surfaces were measured, whether its sensors agree or not."""
-    found = [m.flight.compatibility or m.flight.calibration_alone for m in maneuvers]
-    return all(c is not None and c.instrument is not None for c in found)
-
-
-def with_moving_surfaces(maneuvers: Sequence[FlownManeuver]) -> list[FlownManeuver]:
-    """Return maneuvers whose surfaces move between samples; means of several are smooth already."""
-    return [replace(m, surfaces_move=m.block == 1) for m in maneuvers]
-
-
-def kink_shift(
-    result: FitResult, maneuvers: Sequence[Maneuver], flown: Sequence[FlownManeuver], trim: Trim
-) -> tuple[ShiftedEstimate, ...]:
-    """Return the estimate moved by what kinks between samples leave open, as one deviation.
-
-    Parameters
-    ----------
-    result : FitResult
-    maneuvers : sequence of Maneuver
-        That were fitted.
-    flown : sequence of FlownManeuver
-        The same, with surfaces that move.
-    trim : Trim
-    """
-    found = one_step_of(result, maneuvers, trim)
-    if found is None or not any(m.surfaces_move for m in flown):
-        return ()
-    lines = [
-        replace(m, inputs=replace(f, surfaces_move=False).cut(result.model).inputs)
-        for m, f in zip(maneuvers, flown, strict=True)
-    ]
-    step = KINK_SHARE * found.change(result.model, trim, lines).sum(axis=0)
-    return (ShiftedEstimate(HOLD, result.estimate + step, 1.0, 1.0),)
 
 
 def _share(result: FitResult, found: OneStep, trim: Trim, maneuvers: Sequence[Maneuver]) -> float:

@@ -1,0 +1,121 @@
+"""Do surfaces move between samples as servos do, or along lines?
+
+Where an instrument's file says how they were measured they move, kinks included (`input_kinks`).
+Of a table of others the data say: how far from lines to that motion is one more parameter of white
+output error, its delays beside it. A line cuts the bends of a servo off: at 50 Hz L_p was 0.8 %
+small by it and L_da 0.9 % large, known to 0.7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from host.constants import NORMAL_95
+from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
+from host.sysid.estimators.method_registry import fit
+from host.sysid.flight.filter_step import others_recorded
+from host.sysid.flight.one_step import one_step_of
+from host.sysid.flight.reconstructed_flight import FlownManeuver
+from host.sysid.flight.sampling_error import HOLD
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.templates import Trim
+
+# Of what kinks do to the estimate, one deviation: a servo of second order and 60 rad/s has none,
+# and passes for one of first order that does half as much.
+KINK_SHARE = 0.5
+HALF_WAY = 0.5  # from lines to the motion of servos: beyond it the motion is nearer
+CERTAIN_SD = 2.0  # deviations
+LATE_SD = 0.5  # samples: that much a delay that was estimated on lines has taken up at most
+
+
+def surfaces_known(maneuvers: Sequence[FlownManeuver]) -> bool:
+    """Return whether a file says how surfaces were measured, whether its sensors agree or not."""
+    found = [m.flight.compatibility or m.flight.calibration_alone for m in maneuvers]
+    return all(c is not None and c.instrument is not None for c in found)
+
+
+def with_moving_surfaces(maneuvers: Sequence[FlownManeuver]) -> list[FlownManeuver]:
+    """Return maneuvers whose surfaces move between samples; means of several are smooth already."""
+    return [replace(m, surfaces_move=m.block == 1) for m in maneuvers]
+
+
+def surfaces_bend(used: Sequence[FlownManeuver], model: LinearModel, trim: Trim) -> bool:
+    """Return whether the outputs of a table of others show that surfaces moved as servos do.
+
+    Parameters
+    ----------
+    used : sequence of FlownManeuver
+        That are fitted, their surfaces on lines.
+    model : LinearModel
+        With the delays that are estimated.
+    trim : Trim
+    """
+    if not others_recorded(used):
+        return False
+    data = [m.cut(model) for m in used]
+    try:
+        result = fit("output-error-white", model, data, multiple_starts=False)
+    except IdentificationError:
+        return False
+    found = one_step_of(result, data, trim, [d.name for d in model.delays])
+    if found is None:
+        return False
+    wider = found.widened_in(result)
+    bent = [m.cut(model) for m in with_moving_surfaces(used)]
+    step = found.joint(model, trim, data, [(model, bent)], [1.0 / wider])
+    share, sd = step.added[0], wider * np.sqrt(step.covariance[0, 0])
+    return bool(share > max(HALF_WAY, CERTAIN_SD * sd))
+
+
+def motion_shift(
+    result: FitResult, maneuvers: Sequence[Maneuver], flown: Sequence[FlownManeuver], trim: Trim
+) -> tuple[ShiftedEstimate, ...]:
+    """Return the estimate moved by what the motion between samples leaves open, one deviation each.
+
+    Of surfaces that move it is a share of what kinks do. Of those on lines it is how far the data
+    let them move, a delay beside it.
+
+    Parameters
+    ----------
+    result : FitResult
+    maneuvers : sequence of Maneuver
+        That were fitted, delays taken out.
+    flown : sequence of FlownManeuver
+        The same, with surfaces that move or not.
+    trim : Trim
+    """
+    found = one_step_of(result, maneuvers, trim)
+    if found is None:
+        return ()
+    model = result.model
+    moving = any(m.surfaces_move for m in flown)
+    other = (
+        [replace(m, surfaces_move=False) for m in flown] if moving else with_moving_surfaces(flown)
+    )
+    data = [replace(m, inputs=f.cut(model).inputs) for m, f in zip(maneuvers, other, strict=True)]
+    if moving:
+        steps = KINK_SHARE * found.change(model, trim, data)[None].sum(axis=1)
+    else:
+        wider = found.widened_in(result)
+        directions = [(model, data), (model, _late(model, maneuvers))]
+        step = found.joint(model, trim, maneuvers, directions, [1.0 / wider, LATE_SD / wider])
+        variance = step.covariance[0, 0]
+        by_share = step.covariance[0] / variance @ step.by_added  # the delay follows
+        size = (step.added[0] / NORMAL_95, wider * np.sqrt(variance))
+        steps = np.outer(size, by_share)
+    return tuple(ShiftedEstimate(HOLD, result.estimate + step, 1.0, 1.0) for step in steps)
+
+
+def _late(model: LinearModel, maneuvers: Sequence[Maneuver]) -> list[Maneuver]:
+    """Return maneuvers whose controls are late by a sample, to first order."""
+    late = np.array([name in model.controls() for name in model.inputs])
+    return [
+        replace(m, inputs=m.inputs - np.where(late, np.gradient(m.inputs, axis=0), 0.0))
+        for m in maneuvers
+    ]
