@@ -188,7 +188,7 @@ def test_one_reason_for_two_models_is_said_once(
     path.write_text("\n".join(["t_s,airspeed_mps,elevator_rad,q_radps", *rows]) + "\n")
     assert main(["identify", str(path)]) == 2
     said = capsys.readouterr().err
-    assert said.startswith("host: longitudinal, lateral: no maneuver found")
+    assert said.startswith("host: short-period, lateral: no maneuver found")
     assert said.count("no maneuver found") == 1
 
 
