@@ -159,8 +159,17 @@ def whitened_sensitivities(
     return result
 
 
-def covariance_of_free(information: Array, free: BoolArray, names: Sequence[str]) -> Array:
+def covariance_of_free(
+    information: Array, free: BoolArray, names: Sequence[str] | None = None
+) -> Array:
     """Return the Cramer-Rao covariance over the free parameters; that of others is zero.
+
+    Parameters
+    ----------
+    information : Array, shape (P, P)
+    free : BoolArray, shape (P,)
+    names : sequence of str, optional
+        Of the parameters; by default their numbers from 1.
 
     Raises
     ------
@@ -172,7 +181,8 @@ def covariance_of_free(information: Array, free: BoolArray, names: Sequence[str]
         return covariance
     block = information[np.ix_(free, free)]
     scale = np.sqrt(np.maximum(np.diag(block), 0.0))
-    idle = [names[k] for k in np.flatnonzero(free)[scale == 0.0]]
+    silent = np.flatnonzero(free)[scale == 0.0]
+    idle = [f"parameter {k + 1}" if names is None else names[k] for k in silent]
     if idle:
         raise IdentificationError(
             f"singular information: {', '.join(idle[:MOST_NAMED])} acts on no output in these"
