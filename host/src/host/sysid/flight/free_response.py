@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
+from host.sysid.flight.overlapping_inputs import SUSTAINED, flown_together
 
 if TYPE_CHECKING:
     from host.sysid.flight.maneuver_detection import DetectedManeuver
@@ -50,23 +51,38 @@ def with_free_response(
         name: max(MOVED_THROTTLE if name == "throttle" else MOVED_RAD, MOVED_NOISE * _noise(series))
         for name, series in surfaces.items()
     }
+    groups = flown_together(found)
+    starts_s = [*(group[0].start_s for group in groups), np.inf][1:]
+    before_s = taken_s = -np.inf
     result: list[DetectedManeuver] = []
-    for k, item in enumerate(found):
-        end_s = min((f.start_s for f in found[k + 1 :]), default=np.inf)
-        limits = {name: max(x, MOVED_SHARE * item.amplitude) for name, x in still.items()}
+    for group, next_s in zip(groups, starts_s, strict=True):
+        amplitude = max(item.amplitude for item in group)
+        limits = {name: max(x, MOVED_SHARE * amplitude) for name, x in still.items()}
         at_rest = _AtRest(surfaces, limits, usable)
-        # The slow swings at the ends of an input without edges are its own.
-        own_s = ENDS_S if item.kind in ("multisine", "sweep") else 0.0
-        free_end_s = _until(t, at_rest, item.input_end_s + own_s, end_s - item.lead_s)
-        begin_s = max((f.input_end_s for f in found[:k]), default=-np.inf)
-        taken_s = max((f.fit_window()[1] for f in result), default=-np.inf)
-        first_s = _since(t, at_rest, item.start_s - own_s, max(begin_s + REST_S, taken_s))
-        first_s = max(first_s, float(t[0]))
-        lead_s = min(item.lead_s, item.start_s - float(t[0]))
-        if item.start_s - first_s > SHORTEST_LEAD_S:
-            lead_s = item.start_s - first_s
-        result.append(replace(item, lead_s=lead_s, free_end_s=free_end_s))
-    return result
+        limit_s = max(before_s + REST_S, taken_s)
+        result += _of_group(group, t, at_rest, limit_s, next_s)
+        before_s = max(before_s, *(item.input_end_s for item in group))
+        taken_s = max(item.fit_window()[1] for item in result)
+    return sorted(result, key=lambda item: item.start_s)
+
+
+def _of_group(
+    group: Sequence[DetectedManeuver], t: Array, at_rest: _AtRest, from_s: float, next_s: float
+) -> list[DetectedManeuver]:
+    """Return inputs that overlap, each with the rest before the first and the response to all."""
+    first, last = group[0], max(group, key=lambda item: item.input_end_s)
+    # The slow swings at the ends of an input without edges are its own.
+    own_s = [ENDS_S if item.kind in SUSTAINED else 0.0 for item in (first, last)]
+    free_end_s = _until(t, at_rest, last.input_end_s + own_s[1], next_s - last.lead_s)
+    begin_s = max(_since(t, at_rest, first.start_s - own_s[0], from_s), float(t[0]))
+    lead_s = min(first.lead_s, first.start_s - float(t[0]))
+    if first.start_s - begin_s > SHORTEST_LEAD_S:
+        lead_s = first.start_s - begin_s
+    free_end_s = max(free_end_s, *(item.end_s for item in group)) if len(group) > 1 else free_end_s
+    return [
+        replace(item, lead_s=lead_s + item.start_s - first.start_s, free_end_s=free_end_s)
+        for item in group
+    ]
 
 
 @dataclass(frozen=True, slots=True)

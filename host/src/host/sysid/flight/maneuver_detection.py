@@ -17,6 +17,7 @@ import numpy as np
 from host.arrays import Array, BoolArray, IntArray
 from host.sysid.flight.free_response import with_free_response
 from host.sysid.flight.logged_inputs import logged_inputs
+from host.sysid.flight.overlapping_inputs import SUSTAINED, bounded, without_echoes
 from host.sysid.flight.sustained_inputs import sustained_inputs
 from host.sysid.flight.unit_sign_checks import THROTTLE
 
@@ -30,6 +31,7 @@ HOLD_S = 6.0  # longest step of an input
 SLOW = (0.007, 0.15)  # least swing of an input without edges: surfaces, throttle
 WEAKER = 0.6  # of an input with edges: swings of the pilot beside it
 SHORT_S = 20.0  # a record no longer than this was cut to its input
+TURNING = 0.3  # of the rates behind an edge: before it an aircraft in trim turns less
 PARTING_GAP_S = 5.0
 SHORTEST_PART_S = 1.0  # of a maneuver that a gap divides
 TRIM_AFTER_GAP_S = 0.5  # fits of coefficients reach as far back from the start
@@ -37,14 +39,17 @@ FEWEST = 8  # samples, as a maneuver needs
 SWEEP_LEAD_S = 25.0  # slow swings of a sweep are looked for this far before its first edge
 STEADY_TREND = 0.6  # rank correlation of swing length with order: a sweep's swings shorten
 SWEEP_GAP_S = 1.2  # a 0.15 Hz sine is near its trim no longer than this
-FAINT = 0.2  # of an input: a weaker one of another surface is the pilot's, and ends no response
-SUSTAINED = {"multisine", "sweep"}
-TOGETHER_S = 2.0  # between the ends of inputs flown together, whose first swings may be slow
 RESPONSE_S = 3.0  # the window reaches this long past the last edge
 LEAD_S = 0.3  # of trim before the input, in a fit
 TRIM_S = 1.0  # quiet time before the input
 FLYING_SHARE = 0.5  # of the median airspeed: slower is not flight
 AXES = ("elevator_rad", "aileron_rad", "rudder_rad", "throttle")
+RESPONSE_OF = {
+    "elevator_rad": "q_radps",
+    "aileron_rad": "p_radps",
+    "rudder_rad": "r_radps",
+    "throttle": "airspeed_mps",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +64,7 @@ class DetectedManeuver:
     amplitude: float
     edges: int
     given: bool = False  # by the user, as a stretch of time: a maneuver whatever moved in it
+    swings: bool = False  # without an edge that stands out
     lead_s: float = LEAD_S  # before the input, in a fit
     free_end_s: float = -np.inf  # until then the aircraft was left alone, if that is after `end_s`
 
@@ -120,9 +126,10 @@ def _of_record(columns: Mapping[str, Array], flying: BoolArray) -> list[Detected
         surfaces["throttle"] = _share_of_full(surfaces["throttle"])
     found: list[DetectedManeuver] = []
     for axis, series in surfaces.items():
-        found += _find_axis(axis, t, series, flying)
+        rate = np.nan_to_num(np.asarray(columns.get(RESPONSE_OF[axis], np.zeros(len(t)))))
+        found += _find_axis(axis, t, series, flying, rate)
     found.sort(key=lambda f: f.start_s)
-    found = _bounded(found, float(t[-1]))
+    found = bounded(without_echoes(found, {**columns, **surfaces, "t_s": t}), float(t[-1]))
     logged = logged_inputs(columns, surfaces)
     if logged:
         found = _with_logged_windows(logged, found, float(t[-1]))
@@ -156,7 +163,9 @@ def _parts(item: DetectedManeuver, t: Array, measured: BoolArray) -> list[Detect
     return parts
 
 
-def _find_axis(axis: str, t: Array, series: Array, flying: BoolArray) -> list[DetectedManeuver]:
+def _find_axis(
+    axis: str, t: Array, series: Array, flying: BoolArray, rate: Array
+) -> list[DetectedManeuver]:
     dt_s = float(np.median(np.diff(t)))
     lag = max(1, round(LAG_S / dt_s))
     groups = _edges(axis, t, series, flying, lag)
@@ -164,7 +173,9 @@ def _find_axis(axis: str, t: Array, series: Array, flying: BoolArray) -> list[De
     slow = sustained_inputs(t, series, flying, SLOW[axis == "throttle"])
     result = []
     for first, last in _united(groups, slow, series, lag):
-        result += _describe(axis, t, series, (first, last), lag, flying)
+        sharp = any(first <= begin <= last for begin, _ in groups)
+        for item in _describe(axis, t, series, (first, last), lag, rate if flying[0] else None):
+            result.append(replace(item, swings=not sharp))
     return result
 
 
@@ -233,13 +244,18 @@ def _stirs(span: tuple[int, int], edges: list[tuple[int, int]], series: Array, l
 
 
 def _describe(
-    axis: str, t: Array, series: Array, span: tuple[int, int], lag: int, flying: BoolArray
+    axis: str,
+    t: Array,
+    series: Array,
+    span: tuple[int, int],
+    lag: int,
+    rate: Array | None,
 ) -> list[DetectedManeuver]:
     first, last = span
     settle = float(np.median(series[last : last + 4 * lag + 1]))
     before = series[max(0, first - lag - round(TRIM_S / float(t[1] - t[0]))) : max(1, first - lag)]
     trim = float(np.median(before))
-    if flying[0] and _begins_inside(t, series, first, settle):
+    if rate is not None and _begins_inside(t, series, first, settle, rate):
         first, trim = 0, settle
     inside = series[first : last + 1] - trim
     amplitude = float(np.max(np.abs(inside)))
@@ -271,11 +287,12 @@ def _describe(
     ]
 
 
-def _begins_inside(t: Array, series: Array, first: int, settle: float) -> bool:
+def _begins_inside(t: Array, series: Array, first: int, settle: float, rate: Array) -> bool:
     """Return whether the record begins in an input whose first edge seen is `first`.
 
     It is away from where it comes to rest. A single step may be one of trim as well; in a flight it
-    is taken for that, in a record cut to a few seconds for the end of a pulse.
+    is taken for that, but where the aircraft turned already, and in a record cut to a few seconds
+    for the end of a pulse.
     """
     if t[first] - t[0] > HOLD_S:
         return False
@@ -284,7 +301,17 @@ def _begins_inside(t: Array, series: Array, first: int, settle: float) -> bool:
     size = max(float(np.max(np.abs(away))), float(np.max(np.abs(behind))))
     held = bool(np.mean(np.abs(away) > 0.3 * size) > 0.7)
     both = bool(np.min(behind * np.sign(away[0])) < -0.3 * size)
-    return held and (both or float(t[-1] - t[0]) < SHORT_S)
+    short = float(t[-1] - t[0]) < SHORT_S
+    return held and (both or short or _turns_already(away, rate, first, size))
+
+
+def _turns_already(away: Array, rate: Array, first: int, size: float) -> bool:
+    """Return whether an aircraft answers a held surface as it answers the edge that ends it."""
+    held = round(0.8 * first)  # the edge itself aside
+    before, after = rate[:held], rate[first : 2 * first + 1]
+    if held < FEWEST or np.ptp(np.quantile(away[:held], (0.05, 0.95))) > 0.3 * size:
+        return False
+    return bool(np.std(before) > TURNING * np.std(after) > 0.0)
 
 
 def _slow_start(t: Array, series: Array, start: int, amplitude: float) -> int:
@@ -345,56 +372,6 @@ def _median3(series: Array) -> Array:
     return np.asarray(np.clip(series, low, high))
 
 
-def _bounded(found: list[DetectedManeuver], last_s: float) -> list[DetectedManeuver]:
-    """End each window where the next input begins, and drop echoes inside a stronger input."""
-    kept: list[DetectedManeuver] = []
-    for item in found:
-        overlaps = [
-            k
-            for k in kept
-            if item.start_s < k.input_end_s
-            and k.start_s < item.input_end_s
-            and not _flown_together(item, k)
-        ]
-        weaker = [k for k in overlaps if _strength(k) < 0.5 * _strength(item)]
-        if len(overlaps) > len(weaker):
-            stronger = [k for k in overlaps if k not in weaker]
-            if any(k.amplitude > 2.0 * item.amplitude for k in stronger):
-                continue
-        kept = [k for k in kept if k not in weaker] + [item]
-    kept.sort(key=lambda f: f.start_s)
-    result = []
-    for k, item in enumerate(kept):
-        later = (f for f in kept[k + 1 :] if not _flown_together(f, item))
-        limit = next((f.start_s for f in later if not _faint_beside(f, item)), last_s)
-        result.append(replace(item, end_s=min(item.end_s, max(limit, item.input_end_s), last_s)))
-    return result
-
-
-def _flown_together(item: DetectedManeuver, other: DetectedManeuver) -> bool:
-    """Return whether two inputs that go on begin and end as one: no echo, however unlike in size.
-
-    A pilot who handles the aircraft in an input begins later and goes on behind it.
-    """
-    ends = (item.start_s - other.start_s, item.input_end_s - other.input_end_s)
-    sizes = sorted((_strength(item), _strength(other)))
-    return (
-        {item.kind, other.kind} <= SUSTAINED
-        and max(map(abs, ends)) < TOGETHER_S
-        and sizes[0] > FAINT * sizes[1]
-    )
-
-
-def _faint_beside(other: DetectedManeuver, item: DetectedManeuver) -> bool:
-    """Return whether another surface moves too little to matter in the response to an input."""
-    return other.axis != item.axis and _strength(other) < FAINT * _strength(item)
-
-
-def _strength(item: DetectedManeuver) -> float:
-    """Return the amplitude, that of a throttle as one of a surface."""
-    return item.amplitude * (0.3 if item.axis == "throttle" else 1.0)
-
-
 def _with_logged_windows(
     logged: Mapping[tuple[str, float, float], tuple[str, float]],
     found: list[DetectedManeuver],
@@ -435,14 +412,6 @@ class Grade:
     trim_quiet: float
     feedback: float
     remarks: tuple[str, ...]
-
-
-RESPONSE_OF = {
-    "elevator_rad": "q_radps",
-    "aileron_rad": "p_radps",
-    "rudder_rad": "r_radps",
-    "throttle": "airspeed_mps",
-}
 
 
 def grade(columns: Mapping[str, Array], item: DetectedManeuver) -> Grade:

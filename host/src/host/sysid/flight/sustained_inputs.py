@@ -16,6 +16,7 @@ SMALL, LOW, LOW_SHARE = 0.2, 3.0, 0.5  # of its own swings, of quiet ones, of th
 CUT_S = 60.0  # a record no longer than this may have been cut to its input, and hardly have a rest
 NO_REST = 10.0  # its large swings over its quiet ones, where it has none
 SHORTEST_S = 5.0
+SMOOTHED_S = 0.2
 FEWEST_TURNS = 4  # of the surface about its middle
 
 
@@ -36,12 +37,12 @@ def sustained_inputs(
     half = max(1, round(HALF_S / dt_s))
     if not flying.any():
         return []
-    swing = running_maximum(series, half) + running_maximum(-series, half)
+    swing = _swing(series, half)
     cut = flying.sum() * dt_s <= CUT_S
     quiet, large = np.quantile(swing[flying], (0.05 if cut else 0.2, 0.95))
     if cut and large < NO_REST * quiet:
         quiet = 0.0
-    active = flying & (swing > max(least, ABOVE * quiet))
+    active = flying & (swing > ABOVE * quiet) & (_swing(_smoothed(series, dt_s), half) > least)
     found: list[tuple[int, int]] = []
     for first, last in _spans(active):
         # Slow swings at both ends belong to it: small beside its own, but no rest yet.
@@ -65,6 +66,19 @@ def sustained_inputs(
         for first, last in inner
         if (last - first) * dt_s >= SHORTEST_S and _turns(series[first : last + 1]) >= FEWEST_TURNS
     ]
+
+
+def _swing(series: Array, half: int) -> Array:
+    """Return the range of a surface about each sample."""
+    return running_maximum(series, half) + running_maximum(-series, half)
+
+
+def _smoothed(series: Array, dt_s: float) -> Array:
+    """Return the means about each sample: noise of a pot swings as far as a small input."""
+    size = 2 * round(0.5 * SMOOTHED_S / dt_s) + 1
+    padded = np.pad(series, size // 2, mode="edge")
+    sums = np.cumsum(np.concatenate([[0.0], padded]))
+    return np.asarray((sums[size:] - sums[:-size]) / size)
 
 
 def running_maximum(series: Array, half: int) -> Array:
