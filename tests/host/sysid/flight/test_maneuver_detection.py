@@ -125,6 +125,21 @@ def test_the_free_response_ends_where_something_moves() -> None:
     assert second.fit_window()[0] == pytest.approx(39.7, abs=0.1)
 
 
+@pytest.mark.parametrize("servo_s", [0.025, 0.08])
+def test_the_free_response_is_kept_behind_a_servo(servo_s: float) -> None:
+    """A surface that creeps back to its rest cut the phugoid off: D_V known 7 times worse."""
+    t = np.arange(0.0, 60.0, 0.02)
+    share = 1.0 - np.exp(-0.02 / servo_s)
+    elevator = np.zeros(len(t))
+    for k, command in enumerate(steps(t, 10.0, 0.3)[:-1]):
+        elevator[k + 1] = elevator[k] + share * (command - elevator[k])
+    [item] = found_in(t, elevator)
+    assert item.fit_window() == pytest.approx((0.0, t[-1]), abs=0.05)
+    turn = np.where(t > 13.0, 0.05, 0.0)  # still ends where something moves
+    [item] = found_in(t, elevator, aileron_rad=turn)
+    assert item.free_end_s == pytest.approx(13.0, abs=0.05)
+
+
 @pytest.mark.parametrize(("size_deg", "ends"), [(0.9, False), (2.0, True)])
 def test_a_window_ends_at_the_next_input_and_not_at_handling(size_deg: float, ends: bool) -> None:
     """Small swings of another surface, which begin when the pilot's hands come back."""

@@ -101,21 +101,25 @@ class _AtRest:
 
 
 def _until(t: Array, at_rest: _AtRest, from_s: float, limit_s: float) -> float:
-    """Return until when nothing moves after an input."""
+    """Return until when nothing moves after an input, once the surfaces have come to rest."""
     first = np.searchsorted(t, from_s)
     last, settled = np.searchsorted(t, (min(limit_s, from_s + LONGEST_S), from_s + REST_S), "right")
-    span, settling = np.arange(first, last), np.arange(first, settled)
-    return float(t[span[at_rest.samples(span, settling) - 1]]) if len(span) else -np.inf
+    if last <= first:
+        return -np.inf
+    settling = np.arange(first, settled)
+    whole = at_rest.usable[settling].all()
+    span = np.arange(min(settled, last - 1) if whole else first, last)
+    return float(t[span[at_rest.samples(span, settling) - 1]])
 
 
 def _since(t: Array, at_rest: _AtRest, to_s: float, limit_s: float) -> float:
-    """Return since when nothing moved before an input."""
+    """Return since when nothing moved before an input, its first departure aside."""
     first, last = np.searchsorted(t, (max(limit_s, to_s - LONGEST_LEAD_S), to_s), "right")
-    span = np.arange(first, last)[::-1]
     settled = np.arange(*np.searchsorted(t, (to_s - REST_S, to_s)))
-    if len(span) == 0 or len(settled) == 0:
+    if last <= first or len(settled) == 0 or not at_rest.usable[settled].all():
         return to_s
-    return float(t[span[at_rest.samples(span[1:], settled)]]) if len(span) > 1 else to_s
+    span = np.arange(first, max(settled[0], first) + 1)[::-1]
+    return float(t[span[at_rest.samples(span, settled) - 1]])
 
 
 def _noise(series: Array) -> float:
