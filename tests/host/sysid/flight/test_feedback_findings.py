@@ -20,6 +20,7 @@ from host.sysid.flight.feedback_findings import feedback_findings
 from host.sysid.flight.flight_tables import read_flight_columns
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import identify
+from host.sysid.flight.maneuver_detection import detect_maneuvers
 from host.sysid.flight.maneuver_selection import select_maneuvers
 from host.sysid.models.state_space_model import Term
 from studies.wrong_flights import fly
@@ -157,6 +158,21 @@ def test_the_yaw_damper_of_a_real_aircraft() -> None:
     assert found.feedback is not None
     assert found.feedback.signals == ("r_radps",)
     assert found.feedback.gains[0] == pytest.approx(0.066, abs=0.001)
+
+
+def test_a_damper_engaged_after_the_rest_before_an_input_is_named() -> None:
+    """In the rest the rudder stands still and the aircraft turns: no law explains both."""
+    rest = 300
+    columns = {n: np.concatenate([np.zeros(rest), v]) for n, v in lateral(DAMPER).items()}
+    time = np.arange(rest) * DT_S
+    columns |= {
+        "t_s": np.arange(rest + SAMPLES) * DT_S,
+        "r_radps": columns["r_radps"] + np.pad(0.2 * np.sin(2.0 * time), (0, SAMPLES)),
+    }
+    [first, *others] = detect_maneuvers(columns)
+    rested = replace(first, lead_s=first.start_s)
+    [found] = feedback_findings(columns, [rested, *others])
+    assert found.text.startswith("rudder_rad follows r_radps at ")
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from host.arrays import Array, IntArray
 from host.sysid.flight.data_finding import Feedback, Finding
-from host.sysid.flight.maneuver_detection import DetectedManeuver, runs_of
+from host.sysid.flight.maneuver_detection import LEAD_S, DetectedManeuver, runs_of
 from host.sysid.flight.maneuver_selection import FEWEST
 from host.sysid.numerics.feedback_legs import feedback_legs
 from host.sysid.numerics.state_feedback import FeedbackLaw, feedback_law
@@ -110,8 +110,9 @@ def _windows(
     inside = np.zeros(len(t), dtype=bool)
     for item in maneuvers:
         if item.given or item.axis in axes:
-            first, last = item.fit_window()
-            inside |= (t >= first) & (t <= last)
+            # In the rest before an input an autopilot may not have been engaged yet.
+            first = item.start_s - min(item.lead_s, LEAD_S)
+            inside |= (t >= first) & (t <= item.fit_window()[1])
     inside &= ~(columns.get("bridged", np.zeros(len(t))) > 0.0)
     windows = [w for w in runs_of(inside) if len(w) >= FEWEST]
     if not windows or float(np.std(columns[surface][np.concatenate(windows)])) < STILL_RAD:
