@@ -260,3 +260,46 @@ def test_without_accelerations_a_gust_is_no_delay_of_the_vane(model: str) -> Non
     for name in ("Z_alpha", "M_alpha", "M_q"):
         k = answer.result.index(name)
         assert abs(answer.result.estimate[k] - true[name]) < half[k], name
+
+
+LONGITUDINAL = ("t_s", "airspeed_mps", "q_radps", "theta_rad", "az_mps2", "elevator_rad")
+LATERAL_COLUMNS = (
+    "t_s", "airspeed_mps", "beta_rad", "p_radps", "r_radps", "phi_rad", "ay_mps2", "aileron_rad",
+    "rudder_rad",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def trainer() -> pd.DataFrame:
+    """A flight in calm air, airspeed and attitude vary."""
+    return pd.DataFrame(fly(Air(), 22900)[0])
+
+
+@pytest.mark.parametrize(
+    ("columns", "model", "known"),
+    [
+        # Of one axis: M_q was known to 43 %, N_p to 35; without accelerations M_alpha to 80.
+        ((*LONGITUDINAL, "ax_mps2", "alpha_rad"), "longitudinal", {"M_alpha": 0.05, "M_q": 0.08}),
+        (LATERAL_COLUMNS, "lateral", {"L_p": 0.06, "N_beta": 0.06, "N_p": 0.4}),
+        ((*LONGITUDINAL[:4], "alpha_rad", "elevator_rad"), "longitudinal", {"M_alpha": 0.3}),
+        # Without a vane, by one accelerometer: refused before.
+        (LONGITUDINAL, "longitudinal", {"Z_alpha": 0.1, "M_alpha": 0.06, "M_q": 0.1, "M_de": 0.04}),
+        (LONGITUDINAL, "short-period", {"M_q": 0.3, "M_de": 0.1}),
+    ],
+)
+def test_columns_of_one_axis_are_enough(
+    trainer: pd.DataFrame, columns: tuple[str, ...], model: str, known: dict[str, float]
+) -> None:
+    [answer] = host.identify(trainer[list(columns)], models=model).linear
+    true, half = derivatives(answer.trim.airspeed_mps), answer.result.half_width()
+    for name, share in known.items():
+        width = half[answer.result.index(name)]
+        assert abs(answer.result.value(name) - true[name]) < width, name
+        assert width < share * abs(true[name]), name
+
+
+def test_an_angle_that_nothing_tells_is_refused_with_the_reason(trainer: pd.DataFrame) -> None:
+    table = trainer[list(LONGITUDINAL)].drop(columns="az_mps2")
+    with pytest.raises(IdentificationError, match="az_mps2 beside the airspeed, or a vane") as why:
+        host.identify(table, models="longitudinal")
+    assert "data compatibility" not in str(why.value)

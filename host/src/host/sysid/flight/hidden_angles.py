@@ -11,14 +11,12 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import replace
 
+from host.sysid.aerodynamics.unmeasured_motion import ACCELEROMETER_OF
 from host.sysid.flight.data_finding import Finding
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.state_space_model import LinearModel, without_outputs
 
-ACCELEROMETER_OF = {"alpha_rad": "az_mps2", "beta_rad": "ay_mps2"}
 WORDS = {"alpha_rad": "the angle of attack", "beta_rad": "the sideslip"}
-# These have no derivative that only the level of the angle tells, as drag is.
-MODELS = ("short-period", "dutch-roll", "lateral")
 
 
 def without_vanes(
@@ -36,10 +34,10 @@ def without_vanes(
         return model, ()
     words = " and ".join(WORDS[y] for y in hidden)
     able = [y for y in hidden if ACCELEROMETER_OF[y] in model.outputs]
-    if model.name not in MODELS or able != hidden:
-        raise IdentificationError(
-            f"without vanes {words} was not measured, and {model.name} cannot be told"
-        )
+    if able != hidden:
+        wanted = " and ".join(ACCELEROMETER_OF[y] for y in hidden)
+        why = f"{wanted} beside the airspeed, or a vane, would tell it by this method"
+        raise IdentificationError(f"{words} was not measured; {why}")
     across = {ACCELEROMETER_OF[y] for y in hidden}
     reduced = without_outputs(model, hidden)
     reduced = replace(

@@ -196,7 +196,8 @@ class LinearEstimator:
         self, model: LinearModel, used: Sequence[FlownManeuver], trim: Trim
     ) -> list[Array]:
         """Return the departures (`first_departures`) where an angle is hidden; zeros with vanes."""
-        hidden = any(m.flight.angles is not None for m in used)
+        angles = set(model.states) & set(VANES)
+        hidden = any(m.flight.angles is not None or angles - set(m.flight.corrected) for m in used)
         bare = replace(model, delays=())
 
         def departure_of(

@@ -30,7 +30,8 @@ from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
 from host.sysid.aerodynamics.path_thrust import rotor_means
-from host.sysid.aerodynamics.varying_airspeed import MEASURED, SECOND_ORDER_TERMS, VaryingModel
+from host.sysid.aerodynamics.unmeasured_motion import with_unmeasured
+from host.sysid.aerodynamics.varying_airspeed import SECOND_ORDER_TERMS, VaryingModel
 from host.sysid.estimators.gust_model import gust_deviation_mps
 from host.sysid.flight.column_noise import white_deviation
 from host.sysid.flight.one_step import one_step_of
@@ -125,9 +126,11 @@ class Departure:
 
         `cuts` holds all columns of each.
         """
+        varying = self.varying
+        whole = [with_unmeasured(c, varying.base, estimate, varying.trim) for c in cuts]
         wide = [
-            replace(m, inputs=self.varying.maneuver(c, m.dt_s).inputs)
-            for m, c in zip(maneuvers, cuts, strict=True)
+            replace(m, inputs=varying.maneuver(c, m.dt_s).inputs)
+            for m, c in zip(maneuvers, whole, strict=True)
         ]
         return self._removed(wide, maneuvers, estimate)
 
@@ -187,11 +190,12 @@ def correct_trim_departure(
     Returns
     -------
     Departure or None
-        None where departures of the model are not known or not measured.
+        None where departures of the model are not known or no airspeed was measured.
     """
     base = result.model
-    if base.name not in SECOND_ORDER_TERMS or not all(name in cuts[0] for name in MEASURED):
+    if base.name not in SECOND_ORDER_TERMS or "airspeed_mps" not in cuts[0]:
         return None
+    cuts = [with_unmeasured(c, base, result.estimate, trim) for c in cuts]
     one_step = one_step_of(result, maneuvers if fitted is None else fitted, trim)
     if one_step is None:
         return None

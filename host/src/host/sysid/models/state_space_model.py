@@ -378,6 +378,8 @@ def without_outputs(model: LinearModel, names: Sequence[str]) -> LinearModel:
     delays = [
         replace(d, outputs=tuple(y for y in d.outputs if y not in names)) for d in model.delays
     ]
+    placed = tuple(x for x in model.accelerometer_offsets if x.output not in names)
+    lost = {x.parameter for x in model.accelerometer_offsets} - {x.parameter for x in placed}
     return replace(
         model,
         outputs=tuple(model.outputs[k] for k in keep),
@@ -388,12 +390,11 @@ def without_outputs(model: LinearModel, names: Sequence[str]) -> LinearModel:
             for t in model.terms
             if t.matrix in "AB" or t.row in place
         ),
+        parameters=tuple(p for p in model.parameters if p.name not in lost),
         output_biases=tuple(y for y in model.output_biases if y not in names),
         known_noise=tuple((y, sd) for y, sd in model.known_noise if y not in names),
         delays=tuple(d for d in delays if d.outputs),
-        accelerometer_offsets=tuple(
-            x for x in model.accelerometer_offsets if x.output not in names
-        ),
+        accelerometer_offsets=placed,
     )
 
 

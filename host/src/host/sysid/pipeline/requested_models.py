@@ -32,8 +32,8 @@ WITHOUT_AIRSPEED = (
 )
 WITHOUT_VANES = (
     {"longitudinal": "short-period"},
-    "without vanes longitudinal (speed, drag and lift curve) cannot be told: short-period by q"
-    " and az in its place",
+    "without vanes longitudinal tells drag and what airspeed does poorly: short-period by q and az"
+    " in its place",
 )
 WITHOUT_PITCH = (
     {"longitudinal": "short-period"},
