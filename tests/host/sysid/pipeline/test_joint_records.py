@@ -227,3 +227,26 @@ def test_stretches_that_are_none_say_so(
 ) -> None:
     with pytest.raises(HostError, match=words):
         host.identify([one.table() for one in two], stretches=stretches)
+
+
+def test_a_source_given_again_has_further_stretches(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It was refused as the same samples twice."""
+    first, second = (drawn(50.0, seed, duration_s=5.0) for seed in (1, 2))
+    both = pd.concat([first.table(), second.table()], ignore_index=True)
+    both["t_s"] = 0.02 * np.arange(len(both))
+    path = tmp_path / "a.csv"
+    both.to_csv(path, index=False)
+    once = ["--from", "0", "--to", "4.9", "--from", "5.1", "--to", "9.9"]
+    words = [
+        [str(path), *once],
+        [str(path), *once[:4], str(tmp_path / "." / "a.csv"), *once[4:]],
+    ]
+    texts = []
+    for source in words:
+        assert main(["identify", *source, "--model", "short-period"]) == 0
+        texts.append(capsys.readouterr().out)
+    assert texts[0] == texts[1]
+    assert main(["identify", str(path), *once[:4], str(path)]) == 2
+    assert "give each flight once, or with stretches each time" in capsys.readouterr().err

@@ -47,11 +47,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class PreparedFlight:
-    """A flight ready for estimation, its data-compatibility check, and notes."""
+    """A flight ready for estimation, notes, and its sensors' agreement or why none was sought."""
 
     flight: ReconstructedFlight
     agreement: Compatibility | None
     notes: tuple[str, ...]
+    unchecked: tuple[str, ...] = ()
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -94,6 +95,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
     # A law is seen in commands: a servo moves the surface later and slower.
     findings += feedback_findings({**columns, **commands}, found)
     agreement = calibration_alone = None
+    unchecked: tuple[str, ...] = ()
     try:
         agreement = reconstruct(columns, known.airframe if known else None, instrument, sensors)
         agreement = agreement if how.delays else without_estimated_delays(agreement)
@@ -106,7 +108,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         if instrument is not None and how.corrections:
             calibration_alone = by_calibration_alone(instrument)
     except IdentificationError as error:
-        notes.append(str(error))
+        unchecked = (str(error),)
         findings += [no_instrument_errors_finding(columns)] if read.shares else []
     reconstructed = agreement is not None and known is not None
     findings += no_vanes_finding(columns, reconstructed=reconstructed)
@@ -139,7 +141,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         errors=sensors.errors,
         calibration_alone=calibration_alone,
     )
-    return PreparedFlight(flight, agreement, tuple(notes))
+    return PreparedFlight(flight, agreement, tuple(notes), unchecked)
 
 
 def listed_flights(flights: Source | Sequence[Source]) -> list[Source]:
@@ -186,16 +188,25 @@ def distinct_flights(flights: Sequence[ReconstructedFlight]) -> list[Reconstruct
             ):
                 raise IdentificationError(
                     f"flights {before} and {number} are the same samples ({other.source},"
-                    f" {one.source}); give each flight once"
+                    f" {one.source}); give each flight once, or with stretches each time"
                 )
     return list(flights)
 
 
-def collected_notes(flights: Sequence[PreparedFlight], doubts: Collection[str]) -> list[str]:
-    """Return all notes; with several flights each begins with the source of its flight."""
-    if len(flights) == 1:
-        return [*flights[0].notes, *doubts]
-    own = [f"{f.flight.source}: {note}" for f in flights for note in f.notes]
+def collected_notes(
+    flights: Sequence[PreparedFlight], doubts: Collection[str], *, unchecked: bool = True
+) -> list[str]:
+    """Return all notes; with several flights each begins with the source of its flight.
+
+    Why sensors were not held against each other is no reason for a refusal: left out with
+    `unchecked` false.
+    """
+    named = len(flights) > 1
+    own = [
+        f"{f.flight.source}: {note}" if named else note
+        for f in flights
+        for note in (*f.notes, *(f.unchecked if unchecked else ()))
+    ]
     return [*own, *doubts]
 
 

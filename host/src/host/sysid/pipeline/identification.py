@@ -169,7 +169,8 @@ class Identification:
         [source] = listed_flights([flight])
         found = prepare(source, how, self.aircraft)
         models = identified_models(self.linear, self.coefficients)
-        return simulate(models, found.flight, found.notes, constants=constants)
+        notes = (*found.notes, *found.unchecked)
+        return simulate(models, found.flight, notes, constants=constants)
 
     def document(self) -> dict[str, Any]:
         """Return everything as plain lists, numbers and strings; several flights are lists."""

@@ -23,7 +23,7 @@ from host.sysid.pipeline.arguments import (
 from host.sysid.pipeline.flight_preparation import listed_flights, prepare
 from host.sysid.pipeline.notebook_pictures import Pictures
 from host.sysid.pipeline.prediction_text import simulation_document, simulation_lines
-from host.sysid.pipeline.reading_options import OfEach, reading_options
+from host.sysid.pipeline.reading_options import OfEach, joined_stretches, reading_options
 from host.sysid.pipeline.simulation import Simulation, simulate
 
 if TYPE_CHECKING:
@@ -134,11 +134,17 @@ def predict(
         sensors=sensors,
         row_rate_hz=row_rate_hz,
     )
+    kept, each = joined_stretches(sources, each)
     found = []
-    for source, how in zip(sources, each, strict=True):
+    for source, how in zip([sources[number] for number in kept], each, strict=True):
         known = aircraft_data(aircraft, how.calibration) if aircraft is not None else None
         ready = prepare(source, how, known)
-        notes = (*(finding.line for finding in ready.flight.findings), *ready.notes, *doubts)
+        notes = (
+            *(finding.line for finding in ready.flight.findings),
+            *ready.notes,
+            *ready.unchecked,
+            *doubts,
+        )
         found.append(simulate(models, ready.flight, notes, constants=constants))
     return Prediction(str(path), tuple(found), constants)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -105,3 +105,31 @@ def reading_options(
             strict=True,
         )
     ]
+
+
+def joined_stretches(
+    sources: Sequence[Any], each: Sequence[ReadingOptions]
+) -> tuple[list[int], list[ReadingOptions]]:
+    """Return which sources differ, and how each is read: with the stretches of its repetitions.
+
+    A source that is given again with stretches of its own has further stretches. Of one without
+    the same samples would be fitted twice: it stays apart, and is refused.
+    """
+    kept: list[int] = []
+    joined: list[ReadingOptions] = []
+    for number, (source, how) in enumerate(zip(sources, each, strict=True)):
+        for at, before in zip(kept, joined, strict=True):
+            alike = replace(before, stretches=how.stretches) == how
+            if alike and before.stretches and how.stretches and _same(sources[at], source):
+                spans = dict.fromkeys((*before.stretches, *how.stretches))
+                joined[kept.index(at)] = replace(before, stretches=tuple(spans))
+                break
+        else:
+            kept.append(number)
+            joined.append(how)
+    return kept, joined
+
+
+def _same(one: Any, other: Any) -> bool:
+    paths = isinstance(one, str | Path) and isinstance(other, str | Path)
+    return Path(one).resolve() == Path(other).resolve() if paths else one is other

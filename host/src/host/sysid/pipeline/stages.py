@@ -31,7 +31,7 @@ from host.sysid.pipeline.flight_preparation import (
     prepare,
 )
 from host.sysid.pipeline.identification import Identification
-from host.sysid.pipeline.reading_options import OfEach, reading_options
+from host.sysid.pipeline.reading_options import OfEach, joined_stretches, reading_options
 from host.sysid.pipeline.requested_models import (
     ModelName,
     Models,
@@ -135,6 +135,9 @@ def identify(
         sensors=sensors,
         row_rate_hz=row_rate_hz,
     )
+    kept, each = joined_stretches(sources, each)
+    true_files = _truth_files(truth, len(sources), kept)
+    sources = [sources[number] for number in kept]
     calibrations = [how.calibration for how in each]
     by_calibration = {
         made_by: aircraft_data(aircraft, made_by) if aircraft is not None else None
@@ -146,24 +149,25 @@ def identify(
         prepare(source, how, by_calibration[how.calibration])
         for source, how in zip(sources, each, strict=True)
     ]
-    notes = collected_notes(ready, known.doubts if known else ())
+    reading = known.doubts if known else ()
     findings = collected_findings(ready)
-    notes += accepted_in_vain(each[0].accept, findings)
+    more = accepted_in_vain(each[0].accept, findings)
     recorded = distinct_flights([one.flight for one in ready])
-    true = _truth(truth, len(recorded))
+    true = _truth(true_files, len(recorded))
     expected = _prior(prior, recorded, known)
     asked, instead = possible_models(asked, [flight.recorded for flight in recorded])
-    notes += instead
+    more += instead
     direct, doubts = _coefficients(asked, known, recorded)
     linear, unfit = _linear(asked, by, options, known, recorded)
     if not linear and direct is None:
-        raise IdentificationError("; ".join([*unfit, *(f.line for f in findings), *notes, *doubts]))
+        notes = [*collected_notes(ready, reading, unchecked=False), *more]
+        raise IdentificationError("; ".join([*unfit, *doubts, *(f.line for f in findings), *notes]))
     return Identification(
         flights=tuple(recorded),
         agreements=tuple(one.agreement for one in ready),
         linear=tuple(linear),
         coefficients=direct,
-        notes=(*notes, *doubts, *unfit),
+        notes=(*collected_notes(ready, reading), *more, *doubts, *unfit),
         methods=by,
         reading=each[0],
         aircraft=known,
@@ -223,9 +227,16 @@ def _linear(
     return answers, [f"{', '.join(labels)}: {error}" for error, labels in failed.items()]
 
 
-def _truth(given: str | Path | Sequence[str | Path] | None, flights: int) -> dict[str, Any] | None:
-    """Return the truth of all flights as one, with the maneuvers of all."""
+def _truth_files(
+    given: str | Path | Sequence[str | Path] | None, flights: int, kept: Sequence[int]
+) -> list[Path]:
+    """Return the files of truth; of a source that was given again one of its own may be given."""
     paths = paths_of("truth", given)
+    return [paths[number] for number in kept] if len(paths) == flights else paths
+
+
+def _truth(paths: Sequence[Path], flights: int) -> dict[str, Any] | None:
+    """Return the truth of all flights as one, with the maneuvers of all."""
     if not paths:
         return None
     documents = [read_truth(path) for path in paths]
