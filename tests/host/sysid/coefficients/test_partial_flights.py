@@ -95,6 +95,21 @@ def test_lateral_maneuvers_alone(table: pd.DataFrame, whole: host.Identification
     assert part.plot()
 
 
+def test_records_of_one_axis_without_the_forces_of_the_other(
+    table: pd.DataFrame, whole: host.Identification
+) -> None:
+    """They were refused: roll and yaw for want of alpha, lift and pitch for want of ax."""
+    along = ["alpha_rad", "theta_rad", "q_radps", "elevator_rad", "ax_mps2", "az_mps2"]
+    rolling = identified(table.drop(columns=along))
+    assert rows(rolling) == {"CY", "Cl", "Cn"}
+    agrees(rolling, whole, ROLL_AND_YAW)
+    assert any("taken as in level flight" in line for line in rolling.verdict)
+    pitching = identified(table.drop(columns=[*SIDE, "ax_mps2"]))
+    assert rows(pitching) == {"CL", "Cm"}
+    agrees(pitching, whole, LIFT_AND_PITCH)
+    assert any("no ax_mps2: CD left out" in line for line in pitching.verdict)
+
+
 def test_a_flying_wing(table: pd.DataFrame, whole: host.Identification) -> None:
     for lacking in (table.drop(columns=["rudder_rad"]), table.assign(rudder_rad=0.0)):
         part = identified(lacking)

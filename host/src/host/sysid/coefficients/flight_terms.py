@@ -26,6 +26,8 @@ SIDE_COLUMNS = (
     "beta_rad", "p_radps", "r_radps", "ay_mps2", "phi_rad", "aileron_rad", "rudder_rad",
 )  # fmt: skip
 PITCH_COLUMNS = ("q_radps", "elevator_rad")
+LEVEL_COLUMNS = ("alpha_rad", "theta_rad", "ax_mps2", "az_mps2")  # of level flight without them
+LEVEL_SD_RAD = 0.05  # of an angle of attack that nobody measured
 CONTROLS = {"da": "aileron_rad", "dr": "rudder_rad"}
 STILL_RAD = 1e-9
 
@@ -89,6 +91,11 @@ def flight_terms(
         remarks.append(f"taken as zero, for the data have none: {', '.join(unflown)}")
     found |= dict.fromkeys(unflown, zeros)
     assumed = _air_assumed(found)
+    level = [c for c in (LEVEL_COLUMNS if not along else ("ax_mps2",)) if c not in found]
+    if level:
+        remarks.append(f"taken as in level flight, for the data have none: {', '.join(level)}")
+        assumed |= {"alpha_zero_rad": LEVEL_SD_RAD} if "alpha_rad" in level else {}
+        found |= _level_flight(found)
     remarks += _complete_air(found)
     still = [] if not across else [k for k, c in CONTROLS.items() if _still(found, c, windows)]
     if still:
@@ -99,8 +106,11 @@ def flight_terms(
         found |= {c: zeros for c in moved if c not in found}
     thrust = thrust_column(found, powerplant)
     remarks += thrust.remarks
-    if not thrust.known:
-        drag = [n for n in model.equations if n in DRAG and n not in lost]
+    drag = [n for n in model.equations if n in DRAG and n not in lost]
+    if along and drag and level:
+        lost += drag
+        remarks.append(f"no ax_mps2: {', '.join(drag)} left out")
+    elif not thrust.known:
         lost += drag
         if along and drag:
             remarks.append(
@@ -120,6 +130,19 @@ def flight_terms(
     if thrust.assumed_share is not None:
         assumed["thrust_share"] = thrust.assumed_share
     return FlightTerms(replace(model, equations=equations), windows, found, tuple(remarks), assumed)
+
+
+def _level_flight(columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Return what nobody measured as it is in level flight."""
+    still = np.zeros(len(columns["t_s"]))
+    theta = columns.get("theta_rad", columns.get("alpha_rad", still))
+    steady = {
+        "theta_rad": theta,
+        "alpha_rad": theta,
+        "ax_mps2": GRAVITY_MPS2 * np.sin(theta),
+        "az_mps2": -GRAVITY_MPS2 * np.cos(theta),
+    }
+    return {name: values for name, values in steady.items() if name not in columns}
 
 
 def _air_assumed(columns: Mapping[str, Array]) -> dict[str, float]:
@@ -149,12 +172,12 @@ def _complete_air(found: dict[str, Array]) -> list[str]:
         found["qbar_pa"] = 0.5 * found["density_kgpm3"] * found["airspeed_mps"] ** 2
         remarks.append("qbar_pa made of airspeed_mps and density")
     flown = ("theta_rad", "alpha_rad", "airspeed_mps")
-    if "static_pa" not in found and all(name in found for name in flown):
+    height_m = found.get("altitude_m")
+    if height_m is None and all(name in found for name in flown):
         theta, alpha, speed = (found[name] for name in flown)
-        height_m = found.get("altitude_m")
-        if height_m is None:
-            dt_s = float(found["t_s"][1] - found["t_s"][0])
-            height_m = np.cumsum(speed * np.sin(theta - alpha)) * dt_s
+        dt_s = float(found["t_s"][1] - found["t_s"][0])
+        height_m = np.cumsum(speed * np.sin(theta - alpha)) * dt_s
+    if "static_pa" not in found and height_m is not None:
         found["static_pa"] = 101325.0 - GRAVITY_MPS2 * found["density_kgpm3"] * height_m
         of = "altitude_m" if "altitude_m" in found else "the path's angle"
         remarks.append(f"static_pa made of {of}")
