@@ -154,36 +154,33 @@ def _simulated(model: LinearModel, name: str, u: Array, gust: Array, fault: str)
     row, state = (model.states.index(s) for s in SOFTENING[name])
     stiffness = A[row, state]
     dt_s, per = DT_S / FINE, round(MANEUVER_S / DT_S)
-    pole = np.exp(-dt_s / LAG_S)
-    x, late = np.zeros(len(A)), np.zeros(u.shape[1])
+    states, inputs = B.shape
+    x = np.zeros(states + inputs)  # states, then surfaces behind the servos
     y = np.zeros((len(u), len(C)))
 
-    def rate(x: Array, held: Array, wind: float) -> Array:
-        met = x.copy()
-        met[vane] += wind
-        out = A @ x + B @ held + A[:, vane] * wind
+    def rate(x: Array, commanded: Array, wind: float) -> Array:
+        air, late = x[:states], x[states:]
+        held = late if fault == "hidden lag" else commanded
+        out = A @ air + B @ held + A[:, vane] * wind
         if fault == "non-linearity":
-            out[row] -= (
-                stiffness
-                * met[state]
-                * SOFTENING_SHARE
-                * min((met[state] / SOFTENING_RAD) ** 2, 1.5)
-            )
-        return np.asarray(out)
+            met = air[state] + (wind if state == vane else 0.0)
+            softened = SOFTENING_SHARE * min((met / SOFTENING_RAD) ** 2, 1.5)
+            out[row] -= stiffness * met * softened
+        return np.concatenate([out, (commanded - late) / LAG_S])
 
     for k in range(len(u)):
         if k % per == 0:
-            x, late = np.zeros(len(A)), np.zeros(u.shape[1])
-        met = x.copy()
+            x = np.zeros(states + inputs)
+        met = x[:states].copy()
         met[vane] += gust[k * FINE]
-        y[k] = C @ met + D @ (late if fault == "hidden lag" else u[k])
-        nxt = u[k + 1] if k + 1 < len(u) else u[k]
+        y[k] = C @ met + D @ (x[states:] if fault == "hidden lag" else u[k])
+        slope = ((u[k + 1] if k + 1 < len(u) else u[k]) - u[k]) / FINE
         for f in range(FINE):
-            now = u[k] + (nxt - u[k]) * (f + 0.5) / FINE
-            late = now + (late - now) * pole
-            held = late if fault == "hidden lag" else now
             w = float(gust[k * FINE + f])
-            k1 = rate(x, held, w)
-            k2 = rate(x + 0.5 * dt_s * k1, held, w)
-            x = x + dt_s * k2
+            begin, middle, end = (u[k] + slope * (f + part) for part in (0.0, 0.5, 1.0))
+            k1 = rate(x, begin, w)
+            k2 = rate(x + 0.5 * dt_s * k1, middle, w)
+            k3 = rate(x + 0.5 * dt_s * k2, middle, w)
+            k4 = rate(x + dt_s * k3, end, w)
+            x = x + dt_s * (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0
     return y
