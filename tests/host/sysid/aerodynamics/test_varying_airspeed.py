@@ -86,8 +86,8 @@ def test_missing_signals_and_axes_are_named(calm: tuple[str, NonlinearFlight]) -
     with pytest.raises(IdentificationError, match="departures need theta_rad"):
         varying(axis).maneuver(columns, DT_S)
     plane = varying(axis)
-    with pytest.raises(IdentificationError, match="'roll', known are those of longitudinal"):
-        VaryingModel(plane.base, "roll", plane.trim, plane.airframe)
+    with pytest.raises(IdentificationError, match="'phugoid', known are those of longitudinal"):
+        VaryingModel(plane.base, "phugoid", plane.trim, plane.airframe)
 
 
 def test_filter_error_beats_output_error_on_the_aircraft_as_it_is() -> None:

@@ -29,26 +29,29 @@ def with_unmeasured(
     Parameters
     ----------
     columns : mapping
-        Airspeed at least.
     model : LinearModel
         That was fitted.
     estimate : Array
         Of its parameters, these first.
     trim : Trim
-        Of steady flight, wings level, in place of what nobody measured.
+        Of steady flight in place of what nobody measured; wings bank by the rolling measured.
     """
     found = {**_angles_by_force(columns, model, estimate), **columns}
-    still = np.zeros(len(columns["airspeed_mps"]))
+    still = np.zeros(len(columns["t_s"]))
     path_rad = trim.theta_rad - trim.alpha_rad
     along, normal = GRAVITY_MPS2 * np.sin(path_rad), -GRAVITY_MPS2 * np.cos(path_rad)
     sine, cosine = np.sin(trim.alpha_rad), np.cos(trim.alpha_rad)
     alpha = found.get("alpha_rad", still + trim.alpha_rad)
     steady = dict.fromkeys(SYMMETRIC, still) | {
+        "airspeed_mps": still + trim.airspeed_mps,
         "alpha_rad": alpha,
         "theta_rad": alpha + path_rad,
         "ax_mps2": still + along * cosine - normal * sine,
         "az_mps2": still + along * sine + normal * cosine,
     }
+    if "p_radps" in columns:
+        rolled = 0.5 * (columns["p_radps"][1:] + columns["p_radps"][:-1])
+        steady["phi_rad"] = np.append(0.0, np.cumsum(rolled * np.diff(columns["t_s"])))
     return steady | found
 
 

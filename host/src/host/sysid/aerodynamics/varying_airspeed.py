@@ -21,6 +21,7 @@ from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.sysid.aerodynamics.gust_reckoning import AXES, gust_motion, turning
+from host.sysid.aerodynamics.left_out_terms import LeftOutTerm
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
@@ -45,6 +46,8 @@ SECOND_ORDER_TERMS: dict[str, tuple[tuple[str, str, str], ...]] = {
         ("N_beta_alpha", "r_radps", "beta_rad"),
         ("N_p_alpha", "r_radps", "p_radps"),
     ),
+    "dutch-roll": (),
+    "roll": (),
 }
 # What airspeed does to a motion it is no state of: the propeller's torque does not grow with V^2,
 # what holds against it in trim does (left out, Cn_r is 4 % off in still air).
@@ -52,12 +55,16 @@ AIRSPEED_TERMS: dict[str, tuple[tuple[str, str], ...]] = {
     "longitudinal": (),
     "short-period": (),
     "lateral": (("Y_V", "beta_rad"), ("L_V", "p_radps"), ("N_V", "r_radps")),
+    "dutch-roll": (),
+    "roll": (),
 }
 # States in whose equations a gust that turns with the aircraft appears.
 GUST_TURNING_STATES = {
     "longitudinal": ("airspeed_mps", "alpha_rad"),
     "short-period": ("alpha_rad",),
     "lateral": ("beta_rad",),
+    "dutch-roll": ("beta_rad",),
+    "roll": (),
 }
 # Prior mean and deviation of `gust_turns`: 1 if gusts turn with the aircraft, 0 if they stay with
 # the ground.
@@ -72,15 +79,17 @@ class VaryingModel:
     Attributes
     ----------
     base : LinearModel
-        Longitudinal or lateral template, in derivatives or coefficients, without delays.
+        Template, in derivatives or coefficients, without delays.
     axis : str
-        Which of both.
+        Its name.
     trim : Trim
         What the parameters belong to.
     airframe : AirframeData or None
         Inertia, for what rates do to each other; without, that is left out.
     spin_kgm2ps : tuple of float
         Angular momentum of the rotor along x and z.
+    left_out : tuple of LeftOutTerm
+        Of a reduced template, as parameters behind its own.
     """
 
     base: LinearModel
@@ -88,6 +97,7 @@ class VaryingModel:
     trim: Trim
     airframe: AirframeData | None
     spin_kgm2ps: tuple[float, float] = (0.0, 0.0)
+    left_out: tuple[LeftOutTerm, ...] = ()
 
     def __post_init__(self) -> None:
         if self.axis not in SECOND_ORDER_TERMS:
@@ -136,10 +146,8 @@ class VaryingModel:
                 place = m + scaled.index(key)
                 terms.append(Term(matrix, term.row, place, term.parameter, term.gain))
         rests = m + len(scaled) + n + len(self.forces)
-        turning_states, gusts = (
-            GUST_TURNING_STATES[self.axis],
-            rests + len(second_order) + (len(airspeed) > 0),
-        )
+        beside = rests + len(second_order) + (len(airspeed) > 0)
+        turning_states, gusts = GUST_TURNING_STATES[self.axis], beside + len(self.left_out)
         size = gusts + len(turning_states) * (1 + len(AXES))
         B, D = np.zeros((n, size)), np.zeros((p, size))
         B[:, :m], D[:, :m] = base.B, base.D
@@ -153,10 +161,9 @@ class VaryingModel:
                 at = base.outputs.index(force)
                 terms.append(Term("D", at, rests + k, name, float(turn[force])))
         for name, row in airspeed:
-            terms.append(Term("B", base.states.index(row), gusts - 1, name))
-            if row == "beta_rad" and "ay_mps2" in self.forces:
-                side = base.outputs.index("ay_mps2")
-                terms.append(Term("D", side, gusts - 1, name, self.trim.airspeed_mps))
+            terms += self._acting(name, row, beside - 1)
+        for k, extra in enumerate(self.left_out):
+            terms += self._acting(extra.name, extra.row, beside + k)
         more: tuple[Parameter, ...] = ()
         if turning_air:
             share = STEADY_SHARE * self.trim.airspeed_mps
@@ -178,6 +185,7 @@ class VaryingModel:
                 *(f"rest of {name}" for name in (*base.states, *self.forces)),
                 *(f"{column} by alpha on {row}" for _, row, column in second_order),
                 *(("airspeed over its trim",) if airspeed else ()),
+                *(f"{t.column} left out of {t.row}" for t in self.left_out),
                 *(f"turning {of} on {row}" for row in turning_states for of in ("gust", *AXES)),
             ),
             B=B,
@@ -186,9 +194,23 @@ class VaryingModel:
             parameters=(
                 *base.parameters,
                 *(Parameter(name) for name, *_ in (*second_order, *airspeed)),
+                *(Parameter(t.name) for t in self.left_out),
                 *more,
             ),
         )
+
+    def _acting(self, name: str, row: str, column: int) -> list[Term]:
+        """Return the terms of a derivative of an input: side force is measured too."""
+        found = [Term("B", self.base.states.index(row), column, name)]
+        if row == "beta_rad" and "ay_mps2" in self.forces:
+            side = self.base.outputs.index("ay_mps2")
+            found.append(Term("D", side, column, name, self.trim.airspeed_mps))
+        return found
+
+    def _moving(self, values: Array) -> Array:
+        """Return an input between its samples: its mean, held; on a line what a reduced template
+        leaves out, for half a sample of that is as much as N_r was off by, 2 %."""
+        return values if self.left_out else _neighbour_means(values)
 
     def maneuver(
         self, columns: Mapping[str, Array], dt_s: float, name: str = "maneuver"
@@ -215,23 +237,22 @@ class VaryingModel:
         inputs = [columns[c] for c in self.base.inputs]
         for column, power in self.scaled:
             change = (ratio**power - 1.0) * _deviation(columns[column])
-            inputs.append(change if column in self.base.inputs else _neighbour_means(change))
-        inputs += [
-            _neighbour_means(_deviation(rest)) for rest in self._nonlinear_rates(columns, ratio)
-        ]
+            inputs.append(change if column in self.base.inputs else self._moving(change))
+        inputs += [self._moving(_deviation(rest)) for rest in self._nonlinear_rates(columns, ratio)]
         inputs += [_deviation(rest) for rest in self._nonlinear_forces(columns, ratio)]
         angle = _deviation(columns["alpha_rad"])
         inputs += [
-            _neighbour_means(_deviation(angle * _deviation(columns[column])))
+            self._moving(_deviation(angle * _deviation(columns[column])))
             for _, _, column in SECOND_ORDER_TERMS[self.axis]
         ]
         if AIRSPEED_TERMS[self.axis]:
-            inputs.append(_neighbour_means(ratio - 1.0))
+            inputs.append(self._moving(ratio - 1.0))
+        inputs += [self._moving(_deviation(columns[t.column])) for t in self.left_out]
         gust, steady = gust_motion(columns, dt_s)
         motions = [gust, *(steady[:, :, k] for k in range(len(AXES)))]
         turns = [turning(columns, motion) for motion in motions]
         inputs += [
-            _neighbour_means(turn[row]) for row in GUST_TURNING_STATES[self.axis] for turn in turns
+            self._moving(turn[row]) for row in GUST_TURNING_STATES[self.axis] for turn in turns
         ]
         outputs = np.column_stack([columns[y] for y in self.base.outputs])
         return Maneuver(dt_s, np.column_stack(inputs), outputs, name=name)

@@ -154,6 +154,14 @@ def one_input_for_two(answer: Answer, evidence: Evidence) -> list[Doubt]:
     return _named(answer, derivatives_of_both(answer), "of both inputs, one was left out")
 
 
+def motion_left_out(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """A reduced template was fitted without what other states do: short records do not show it."""
+    if not answer.left_out:
+        return []
+    reason = f"what {' and '.join(answer.left_out)} does beside {answer.template} is in no interval"
+    return _about(answer, answer.model.states, reason)
+
+
 def open_finding(answer: Answer, evidence: Evidence) -> list[Doubt]:
     """The data checks found something in that channel, and nothing has closed it."""
     return [
@@ -187,6 +195,7 @@ Rule = Callable[[Answer, Evidence], list[Doubt]]
 RULES: tuple[Rule, ...] = (
     open_finding, input_feedback, lag_unknown, fit_fails, not_predicted, driven_by_inputs,
     delay_at_bound, on_a_bound, impossible_sign, methods_disagree, one_input_for_two,
+    motion_left_out,
 )  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from host.sysid.estimators.innovations import innovations_of
 from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.start_values import start_values_of
 from host.sysid.identification_error import IdentificationError
-from host.sysid.models.fit_result import FitResult
+from host.sysid.models.fit_result import FitResult, without_parameters
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.output_error_problem import OutputProblem
@@ -95,24 +95,7 @@ def fit_with_gust(
 
 def without_gust_parameters(result: FitResult, model: LinearModel) -> FitResult:
     """Return the result on the model of the aircraft alone: what gusts do is no derivative."""
-    kept = [k for k, name in enumerate(result.names) if not name.startswith(PREFIX)]
-    if len(kept) == len(result.names):
-        return result
-    by_maneuver = {
-        key: value[:, kept]
-        for key, value in result.details.items()
-        if key in ("maneuver_influence", "information_share") and isinstance(value, np.ndarray)
-    }
-    return replace(
-        result,
-        model=model,
-        names=tuple(result.names[k] for k in kept),
-        estimate=result.estimate[kept],
-        covariance=result.covariance[np.ix_(kept, kept)],
-        covariance_white=result.covariance_white[np.ix_(kept, kept)],
-        degrees_of_freedom=result.degrees_of_freedom[kept],
-        details={**result.details, **by_maneuver},
-    )
+    return without_parameters(result, model, [n for n in result.names if n.startswith(PREFIX)])
 
 
 def _with_initial_gusts(

@@ -61,6 +61,7 @@ class Answer:
     explained: dict[str, Prediction] = field(default_factory=dict)  # of outputs fitted, in gusts
     noise_covariance: Array | None = None  # of the estimate, without systematic errors
     coefficient_parts: CoefficientParts | None = None
+    left_out: tuple[str, ...] = ()  # motion beside a reduced template that nothing accounts for
     causes: dict[str, str] = field(default_factory=dict)  # what widens each interval most
     held_out_runs: tuple[
         tuple[Maneuver, Array], ...

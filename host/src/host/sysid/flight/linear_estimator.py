@@ -38,6 +38,7 @@ from host.sysid.flight.fitted_maneuvers import (
     fitted_and_held_out,
 )
 from host.sysid.flight.gust_at_trim import fit_gust_at_trim
+from host.sysid.flight.left_out_motion import fit_beside_left_out, unaccounted_motion
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_intervals import linear_intervals
 from host.sysid.flight.linear_model import (
@@ -146,7 +147,7 @@ class LinearEstimator:
         cuts, departing = [m.inside() for m in used], [m.departing() for m in used]
         spin = spin_of(self.powerplant, departing) if self.own is None else NO_SPIN
         delays: dict[str, tuple[float, float]] = {}
-        fitted = None
+        fitted = beside = None
         if gusty:
             staged, data, fitted = fit_gust_at_trim(model, data, cuts, trim, self.airframe, spin)
             found, model, delays = staged.result, staged.model, staged.delays
@@ -164,17 +165,27 @@ class LinearEstimator:
             single_start: dict[str, object] = (
                 {"multiple_starts": False} if single.startswith("output-error") else {}
             )
-            fitted = remove_departures(data, departures)
-            found = fit(single, model, fitted, **{**single_start, **self.options})
-            both = list(zip(found.fitted, departures, strict=True))
-            if all(y.shape == gone.shape for y, gone in both):  # of frequencies they are others
-                found = replace(found, fitted=tuple(y + gone for y, gone in both))
+            options = {**single_start, **self.options}
+            if self.own is None and single.startswith("output-error"):
+                beside = fit_beside_left_out(
+                    single, model, data, departing, trim, self.airframe, spin, options
+                )
+            if beside is None:
+                fitted = remove_departures(data, departures)
+                found = fit(single, model, fitted, **options)
+                both = list(zip(found.fitted, departures, strict=True))
+                if all(y.shape == gone.shape for y, gone in both):  # of frequencies they are others
+                    found = replace(found, fitted=tuple(y + gone for y, gone in both))
+            else:
+                found = beside.result
         # The start of a gust filter that was lost may have run away: M_alpha -57 000 of one point.
         refuse_unless_finite(found, found.method)
         found = found if servo is None else servo.added_to(found)
         found = replace(found, warnings=(*remarks, *found.warnings))
         left = None
-        if trim.known and self.own is None and found.residual_kind in FREE:
+        if beside is not None:
+            left = beside.departure
+        elif trim.known and self.own is None and found.residual_kind in FREE:
             left = correct_trim_departure(found, data, departing, self.airframe, trim, spin, fitted)
         return LinearEstimate(
             template=self.template if self.own is None else model.name,
@@ -190,6 +201,7 @@ class LinearEstimator:
             departure=left,
             delays=delays,
             servo=servo,
+            left_out=() if self.own else unaccounted_motion(model, left, beside),
         )
 
     def _first_departures(
@@ -257,6 +269,7 @@ class LinearEstimator:
             explained=validation.explained,
             held_out_runs=validation.held_out_runs,
             noise_covariance=statistical.covariance,
+            left_out=e.left_out,
             causes=widest_errors(e.fit, intervals.statistical, intervals.total, intervals.shifts),
         )
 

@@ -13,6 +13,7 @@ from host.sysid.aerodynamics.coefficient_table import (
     ShiftedEstimate,
     coefficient_parts,
 )
+from host.sysid.aerodynamics.left_out_terms import LEFT_OUT_TERMS
 from host.sysid.aerodynamics.path_thrust import path_thrust
 from host.sysid.compatibility.sensor_dynamics import DELAYED_COLUMNS, IMU_DELAY, SERVO_DELAY
 from host.sysid.estimators.coherence_inflation import inflate_by_coherence, widened_to
@@ -142,8 +143,10 @@ def _shifts(
     shifts: tuple[ShiftedEstimate, ...] = () if e.departure is None else e.departure.remainders
     carriers = [m.flight.compatibility or m.flight.calibration_alone for m in e.used]
     known = [c for c in carriers if c is not None]
+    # What a reduced model leaves out would pass for what is open of sensors and surfaces.
+    fitted = e.at_trim(e.estimate) if e.template in LEFT_OUT_TERMS else list(e.maneuvers)
     if len(known) == len(carriers):
-        moved = systematic_error_shifts(statistical, e.maneuvers, e.cuts, known, e.trim)
+        moved = systematic_error_shifts(statistical, fitted, e.cuts, known, e.trim)
         # Of servos that were estimated the covariance has what they leave open, and the IMU's
         # delay with it: all outputs later are all inputs earlier.
         estimated = {SERVO_DELAY, IMU_DELAY} if e.servo is not None else set()
@@ -153,10 +156,10 @@ def _shifts(
         first = e.used[0].flight
         usual = first.errors or usual_errors(first.maker)
         share = airspeed_share(usual, e.condition.qbar_pa)
-        shifts += airspeed_shift(statistical, e.maneuvers, e.trim, share)
+        shifts += airspeed_shift(statistical, fitted, e.trim, share)
     # Delays that were estimated have taken up half a sample, and their intervals count it.
     if not own and (surfaces_known(e.used) or e.delays):
-        shifts += motion_shift(statistical, e.maneuvers, e.used, e.trim)
+        shifts += motion_shift(statistical, fitted, e.used, e.trim)
     else:
-        shifts += hold_shift(statistical, e.maneuvers, e.trim)
+        shifts += hold_shift(statistical, fitted, e.trim)
     return shifts

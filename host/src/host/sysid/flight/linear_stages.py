@@ -45,6 +45,8 @@ class LinearEstimate:
         Estimated before the fit: value and 95 % half-width, s.
     servo : ServoEstimate or None
         Of the inputs that are commands.
+    left_out : tuple of str
+        Columns that act beside a reduced template, and that the fit does not account for.
     """
 
     template: str
@@ -60,6 +62,7 @@ class LinearEstimate:
     departure: Departure | None
     delays: dict[str, tuple[float, float]]
     servo: ServoEstimate | None = None
+    left_out: tuple[str, ...] = ()
 
     @property
     def estimate(self) -> Array:

@@ -14,8 +14,10 @@ turns so, and by how much, no maneuver tells: intervals count it.
 The airspeed is measured, and its noise is in every departure: drawn anew it moves the estimate by
 as much as it has moved it already, and that counts in the covariance.
 
-The drag polar is a parabola in lift; its curvature is estimated along. Filter error with the gust
-is fitted to what output error says is left without departures, and corrected by what that left.
+The drag polar is a parabola in lift; its curvature is estimated along. So is what a reduced
+template leaves out of the other lateral states (`aerodynamics/left_out_terms.py`). Filter error
+with the gust is fitted to what output error says is left without departures, and corrected by what
+that left.
 """
 
 from __future__ import annotations
@@ -29,6 +31,13 @@ from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
+from host.sysid.aerodynamics.left_out_terms import (
+    NEEDED,
+    UNKNOWN_MPS,
+    LeftOutTerm,
+    expected_left_out,
+    terms_left_out,
+)
 from host.sysid.aerodynamics.path_thrust import rotor_means
 from host.sysid.aerodynamics.unmeasured_motion import with_unmeasured
 from host.sysid.aerodynamics.varying_airspeed import SECOND_ORDER_TERMS, VaryingModel
@@ -38,7 +47,7 @@ from host.sysid.flight.one_step import one_step_of
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.state_space_model import LinearModel, Parameter
 from host.sysid.models.templates import Trim
 from host.sysid.numerics.output_error_problem import OutputProblem
 
@@ -46,6 +55,7 @@ TURNED_ANGLES = ("alpha_rad", "beta_rad")
 REMAINDER_SHARE = 0.25  # of the step: what one step and terms of second order leave open
 DEPARTURES = "departures from the linear model"
 DRAG_POLAR = "curvature of the drag polar"
+LEFT_OUT = "motion that the model leaves out"
 TURNING_AIR = "gust along the path, turning with the aircraft"
 # Deviation of that gust, in the deviation of the gusts found. Near the ground it is 1.3 of theirs
 # (MIL-F-8785C, 3.7.2), the mean over a maneuver less. With 0.5 M_alpha held in 55 of 64 flights of
@@ -75,6 +85,8 @@ class Departure:
         With these inputs.
     maneuvers : tuple of Maneuver
         Those fitted, with these inputs.
+    beside : dict
+        Terms that a reduced template leaves out: what is expected, and one deviation.
     """
 
     shares: Array
@@ -83,6 +95,7 @@ class Departure:
     varying: VaryingModel
     model: LinearModel
     maneuvers: tuple[Maneuver, ...]
+    beside: dict[str, tuple[float, float]]
 
     @property
     def step(self) -> Array:
@@ -99,6 +112,33 @@ class Departure:
             tested = np.any(influence != 0.0, axis=0)  # what need not agree stays out of the test
             details["maneuver_influence"] = influence + tested * self.shares
         return replace(result, estimate=result.estimate + self.step, details=details)
+
+    def wide_model(self, base: LinearModel) -> LinearModel:
+        """Return a template with the departures as inputs, and the terms estimated along as
+        parameters behind its own."""
+        known = _with_second_order(self.varying.model, base, {})
+        more = [t for t in self.varying.model.terms if t.parameter in self.beside]
+        added = (Parameter(name, mean, prior_sd=sd) for name, (mean, sd) in self.beside.items())
+        return replace(
+            known,
+            terms=(*known.terms, *more),
+            parameters=(*known.parameters, *added),
+            delays=base.delays,
+        )
+
+    def of_fit(self, wide: FitResult, length: int) -> Departure:
+        """Return the departures as a fit of `wide_model` has them: nothing is left to be moved.
+
+        `length` is that of the estimate without the terms.
+        """
+        known = {name: wide.value(name) for name in self.beside}
+        return replace(
+            self,
+            shares=np.zeros((len(self.maneuvers), length)),
+            remainders=(),
+            airspeed_noise=np.zeros((length, length)),
+            model=_with_second_order(self.varying.model, self.varying.base, known),
+        )
 
     def with_airspeed_noise(self, result: FitResult) -> FitResult:
         """Return the result with the noise of the airspeed in its covariance."""
@@ -190,29 +230,34 @@ def correct_trim_departure(
     Returns
     -------
     Departure or None
-        None where departures of the model are not known or no airspeed was measured.
+        None where departures of the model are not known, or not measured.
     """
     base = result.model
-    if base.name not in SECOND_ORDER_TERMS or "airspeed_mps" not in cuts[0]:
+    if not departures_measured(base.name, cuts):
         return None
+    left_out = terms_left_out(base.name, cuts[0], trim)
+    if not trim.known:
+        trim = replace(trim, airspeed_mps=UNKNOWN_MPS)
     cuts = [with_unmeasured(c, base, result.estimate, trim) for c in cuts]
     one_step = one_step_of(result, maneuvers if fitted is None else fitted, trim)
     if one_step is None:
         return None
-    varying = VaryingModel(base, base.name, trim, airframe, spin)
+    varying = VaryingModel(base, base.name, trim, airframe, spin, left_out)
     straight = _with_second_order(varying.model, base, {})
-    curvature = _curvature_sd(result, trim)
+    beside = _left_out(result, left_out)
+    curvature = _curvature_sd(result, trim) | {name: sd for name, (_, sd) in beside.items()}
     curved = [_with_second_order(varying.model, base, {name: 1.0}) for name in curvature]
     data = [
         replace(m, inputs=varying.maneuver(c, m.dt_s).inputs)
         for m, c in zip(maneuvers, cuts, strict=True)
     ]
-    beside = [(model, data) for model in curved]
-    found = one_step.joint(straight, trim, data, beside, list(curvature.values()))
+    bends = [(model, data) for model in curved]
+    found = one_step.joint(straight, trim, data, bends, list(curvature.values()))
     if not np.isfinite(found.shares).all():
         return None
     step = found.shares.sum(axis=0)
-    unknown = np.sqrt(np.diag(found.covariance))[:, None] * found.by_added
+    unknown = _root(found.covariance) @ found.by_added
+    cause = LEFT_OUT if left_out else DRAG_POLAR
     # Only the fit that stands has intervals: the rough one before it is measured as it is.
     along_mps = 0.0 if fitted is None else gust_deviation_mps(result, trim.airspeed_mps)
     turned: Array = np.zeros((0, len(step)))
@@ -231,7 +276,7 @@ def correct_trim_departure(
         found.shares,
         (
             ShiftedEstimate(DEPARTURES, result.estimate + step + REMAINDER_SHARE * step, 1.0, 1.0),
-            *(ShiftedEstimate(DRAG_POLAR, result.estimate + step + s, 1.0, 1.0) for s in unknown),
+            *(ShiftedEstimate(cause, result.estimate + step + s, 1.0, 1.0) for s in unknown),
             *(ShiftedEstimate(TURNING_AIR, result.estimate + step + s, 1.0, 1.0) for s in turned),
         ),
         noise,
@@ -240,7 +285,36 @@ def correct_trim_departure(
             varying.model, base, dict(zip(curvature, map(float, found.added), strict=True))
         ),
         tuple(data),
+        beside,
     )
+
+
+def departures_measured(name: str, cuts: Sequence[Mapping[str, Array]]) -> bool:
+    """Return whether departures of a template are known, and measured in all maneuvers.
+
+    Parameters
+    ----------
+    name : str
+        The template.
+    cuts : sequence of mapping
+        All columns of each maneuver.
+    """
+    needed = NEEDED.get(name, ("airspeed_mps",))
+    return name in SECOND_ORDER_TERMS and all(c in cut for cut in cuts for c in needed)
+
+
+def _root(covariance: Array) -> Array:
+    """Return rows whose outer products sum to a covariance."""
+    value, vector = np.linalg.eigh(covariance)
+    return np.asarray((vector * np.sqrt(np.maximum(value, 0.0))).T)
+
+
+def _left_out(result: FitResult, terms: Sequence[LeftOutTerm]) -> dict[str, tuple[float, float]]:
+    """Return what is expected of each term that the template leaves out, by its neighbours."""
+    error = result.standard_error
+    like = {t.like for t in terms if t.like}
+    known = {n: (result.value(n), float(error[result.index(n)])) for n in like}
+    return expected_left_out(terms, known)
 
 
 def _curvature_sd(result: FitResult, trim: Trim) -> dict[str, float]:

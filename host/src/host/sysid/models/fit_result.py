@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Collection
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -105,3 +106,33 @@ class FitResult:
     def matrices(self) -> tuple[Array, Array, Array, Array]:
         """Return A, B, C, D at the estimate."""
         return self.model.matrices(self.estimate[: len(self.model.parameters)])
+
+
+def without_parameters(result: FitResult, model: LinearModel, names: Collection[str]) -> FitResult:
+    """Return a result on a model that has not these parameters; the others stay as uncertain.
+
+    Parameters
+    ----------
+    result : FitResult
+    model : LinearModel
+        Without them.
+    names : collection of str
+    """
+    kept = [k for k, name in enumerate(result.names) if name not in names]
+    if len(kept) == len(result.names):
+        return result
+    by_maneuver = {
+        key: value[:, kept]
+        for key, value in result.details.items()
+        if key in ("maneuver_influence", "information_share") and isinstance(value, np.ndarray)
+    }
+    return replace(
+        result,
+        model=model,
+        names=tuple(result.names[k] for k in kept),
+        estimate=result.estimate[kept],
+        covariance=result.covariance[np.ix_(kept, kept)],
+        covariance_white=result.covariance_white[np.ix_(kept, kept)],
+        degrees_of_freedom=result.degrees_of_freedom[kept],
+        details={**result.details, **by_maneuver},
+    )
