@@ -110,8 +110,22 @@ def impossible_sign(answer: CoefficientAnswer, open_channels: Channels) -> list[
     ]
 
 
+def lag_beside(answer: CoefficientAnswer, open_channels: Channels) -> list[Doubt]:
+    """Surfaces seem to lag behind their columns, and that moves a moment beyond its intervals."""
+    return [
+        one
+        for equation, far in answer.lagging.items()
+        for one in _about(
+            answer,
+            equation,
+            f"surfaces seem to lag behind their columns, which moves {equation} by {far:.1f}"
+            " half-widths",
+        )
+    ]
+
+
 RULES: tuple[Callable[[CoefficientAnswer, Channels], list[Doubt]], ...] = (
-    open_finding, fit_fails, not_predicted, impossible_sign,
+    open_finding, fit_fails, not_predicted, impossible_sign, lag_beside,
 )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -35,6 +35,7 @@ from host.sysid.coefficients.coefficient_modes import (
 from host.sysid.coefficients.coefficient_search import search_coefficients
 from host.sysid.coefficients.deletion_diagnostics import CrossValidation
 from host.sysid.coefficients.flight_terms import flight_terms
+from host.sysid.coefficients.hidden_lag import lagging_equations
 from host.sysid.coefficients.pooled_flights import pool_fits
 from host.sysid.coefficients.window_spectra import SHORTEST_S, ResidualSpectra, Window
 from host.sysid.flight.estimator import answer_of
@@ -101,6 +102,8 @@ class CoefficientAnswer:
         Residual delay (s) and 95 % half-width.
     remarks : tuple of str
         What was left out or assumed, because the flights lack what would tell it.
+    lagging : dict
+        Moments that a lag of surfaces moves beyond their intervals, and how many half-widths.
     """
 
     model: CoefficientModel
@@ -113,6 +116,7 @@ class CoefficientAnswer:
     systems: dict[str, LinearSystem]
     delays: dict[str, tuple[float, float]]
     remarks: tuple[str, ...] = ()
+    lagging: dict[str, float] = field(default_factory=dict)
 
     @property
     def template(self) -> str:
@@ -227,6 +231,7 @@ class CoefficientEstimator:
             systems=linear_systems(fit, self.airframe),
             delays=_delays(fit, self.instrument),
             remarks=tuple(dict.fromkeys(r for one in estimate for r in one.remarks)),
+            lagging=lagging_equations([one.search for one in estimate], fit.derivatives),
         )
 
     def _of_one(self, flight: ReconstructedFlight) -> CoefficientEstimate:
