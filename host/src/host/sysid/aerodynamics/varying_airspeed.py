@@ -210,7 +210,8 @@ class VaryingModel:
     def _moving(self, values: Array) -> Array:
         """Return an input between its samples: its mean, held; on a line what a reduced template
         leaves out, for half a sample of that is as much as N_r was off by, 2 %."""
-        return values if self.left_out else _neighbour_means(values)
+        on_line = bool(self.left_out) and self.base.hold == "foh"
+        return values if on_line else _neighbour_means(values)
 
     def maneuver(
         self, columns: Mapping[str, Array], dt_s: float, name: str = "maneuver"

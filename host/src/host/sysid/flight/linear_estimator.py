@@ -57,8 +57,11 @@ from host.sysid.flight.reconstructed_flight import (
     reconstruct_flight,
 )
 from host.sysid.flight.surface_motion import (
-    surfaces_bend,
-    surfaces_known,
+    HELD,
+    HELD_SURFACES,
+    LINES,
+    SERVOS,
+    between_samples,
     with_moving_surfaces,
 )
 from host.sysid.flight.trim_departure import (
@@ -139,10 +142,14 @@ class LinearEstimator:
             used, held = brought_behind(used, servo.setting), brought_behind(held, servo.setting)
         if method == GUST and self.own is None:
             used = with_filter_step(used, model)
-        if self.own is None and (
-            surfaces_known(used) or (servo is None and surfaces_bend(used, model, trim))
-        ):
+        motion = LINES
+        if self.own is None:
+            motion = between_samples(used, model, trim, behind=servo is not None)
+        if motion == SERVOS:
             used, held = with_moving_surfaces(used), with_moving_surfaces(held)
+        elif motion == HELD:
+            model = replace(model, hold="zoh")
+            remarks += (HELD_SURFACES,)
         data = [m.cut(model) for m in used]
         cuts, departing = [m.inside() for m in used], [m.departing() for m in used]
         spin = spin_of(self.powerplant, departing) if self.own is None else NO_SPIN

@@ -158,7 +158,8 @@ def _shifts(
         share = airspeed_share(usual, e.condition.qbar_pa)
         shifts += airspeed_shift(statistical, fitted, e.trim, share)
     # Delays that were estimated have taken up half a sample, and their intervals count it.
-    if not own and (surfaces_known(e.used) or e.delays):
+    held = e.model.hold == "zoh"
+    if not own and not held and (surfaces_known(e.used) or e.delays):
         shifts += motion_shift(statistical, fitted, e.used, e.trim)
     else:
         shifts += hold_shift(statistical, fitted, e.trim)

@@ -1,9 +1,11 @@
-"""Do surfaces move between samples as servos do, or along lines?
+"""Do surfaces move between samples as servos do, along lines, or are they held?
 
 Where an instrument's file says how they were measured they move, kinks included (`input_kinks`).
 Of a table of others the data say: how far from lines to that motion is one more parameter of white
 output error, its delays beside it. A line cuts the bends of a servo off: at 50 Hz L_p was 0.8 %
-small by it and L_da 0.9 % large, known to 0.7.
+small by it and L_da 0.9 % large, known to 0.7. Of surfaces that are held (a simulator without a
+servo) a line is half a sample early, and every sensor seemed late: at 50 Hz the IMU by all of its
+bound.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from host.constants import NORMAL_95
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
 from host.sysid.estimators.method_registry import fit
 from host.sysid.flight.filter_step import others_recorded
-from host.sysid.flight.one_step import one_step_of
+from host.sysid.flight.one_step import Step, one_step_of
 from host.sysid.flight.reconstructed_flight import FlownManeuver
 from host.sysid.flight.sampling_error import HOLD
 from host.sysid.identification_error import IdentificationError
@@ -25,12 +27,16 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
+from host.sysid.numerics.between_samples import OTHER_HOLD
 
 # Of what kinks do to the estimate, one deviation: a servo of second order and 60 rad/s has none,
 # and passes for one of first order that does half as much.
 KINK_SHARE = 0.5
 HALF_WAY = 0.5  # from lines to the motion of servos: beyond it the motion is nearer
 CERTAIN_SD = 2.0  # deviations
+LINES, SERVOS, HELD = "on lines", "as servos do", "held"
+HELD_SURFACES = "surfaces were held from sample to sample, as the outputs show"
+TINY = 1e-12
 LATE_SD = 0.5  # samples: that much a delay that was estimated on lines has taken up at most
 
 
@@ -45,8 +51,10 @@ def with_moving_surfaces(maneuvers: Sequence[FlownManeuver]) -> list[FlownManeuv
     return [replace(m, surfaces_move=m.block == 1) for m in maneuvers]
 
 
-def surfaces_bend(used: Sequence[FlownManeuver], model: LinearModel, trim: Trim) -> bool:
-    """Return whether the outputs of a table of others show that surfaces moved as servos do.
+def between_samples(
+    used: Sequence[FlownManeuver], model: LinearModel, trim: Trim, *, behind: bool
+) -> str:
+    """Return how surfaces moved between samples: of a table of others as its outputs show it.
 
     Parameters
     ----------
@@ -55,22 +63,40 @@ def surfaces_bend(used: Sequence[FlownManeuver], model: LinearModel, trim: Trim)
     model : LinearModel
         With the delays that are estimated.
     trim : Trim
+    behind : bool
+        They were commanded, and stand behind a servo that was estimated.
+
+    Returns
+    -------
+    str
+        Of `LINES`, `SERVOS`, `HELD`.
     """
-    if not others_recorded(used):
-        return False
+    if surfaces_known(used):
+        return SERVOS
+    if behind or not others_recorded(used):
+        return LINES
     data = [m.cut(model) for m in used]
     try:
         result = fit("output-error-white", model, data, multiple_starts=False)
     except IdentificationError:
-        return False
+        return LINES
     found = one_step_of(result, data, trim, [d.name for d in model.delays])
     if found is None:
-        return False
+        return LINES
     wider = found.widened_in(result)
-    bent = [m.cut(model) for m in with_moving_surfaces(used)]
-    step = found.joint(model, trim, data, [(model, bent)], [1.0 / wider])
-    share, sd = step.added[0], wider * np.sqrt(step.covariance[0, 0])
-    return bool(share > max(HALF_WAY, CERTAIN_SD * sd))
+    bent = (model, [m.cut(model) for m in with_moving_surfaces(used)])
+    held = (replace(model, hold=OTHER_HOLD[model.hold]), data)
+    # Held surfaces jump, which also bends: what explains more is the motion.
+    steps = [found.joint(model, trim, data, [one], [1.0 / wider]) for one in (bent, held)]
+    likely = [_whole_way(step, wider) for step in steps]
+    best = int(np.argmax(likely))
+    return (SERVOS, HELD)[best] if likely[best] > 0.0 else LINES
+
+
+def _whole_way(step: Step, wider: float) -> float:
+    """Return the deviations from lines to a motion if that is what the data show, else none."""
+    share, sd = float(step.added[0]), wider * float(np.sqrt(step.covariance[0, 0]))
+    return share / max(sd, TINY) if share > max(HALF_WAY, CERTAIN_SD * sd) else 0.0
 
 
 def motion_shift(
