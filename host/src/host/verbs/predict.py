@@ -54,9 +54,13 @@ def run(args: argparse.Namespace) -> int:
     from host.sysid.flight.data_finding import check_lines
     from host.sysid.flight.shipped_maps import LIST, map_lines
     from host.sysid.identification_error import IdentificationError
+    from host.sysid.models.thesis_models import shipped_lines
     from host.sysid.pipeline.arguments import option_words
     from host.sysid.pipeline.prediction import predict
 
+    if [str(name) for name in args.source] == [LIST] and not Path(LIST).exists():
+        print("\n".join(shipped_lines()))
+        return int(ExitCode.OK)
     if LIST in [str(one[-1]) for one in args.map]:
         print("\n".join(map_lines()))
         return int(ExitCode.OK)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import Condition
 from host.sysid.answer.estimate_lines import model_lines
+from host.sysid.answer.marks import share_text
 from host.sysid.answer.trust_rules import unpredicted_states
 from host.sysid.answer.verdict import verdict_lines
 from host.sysid.estimators.method_registry import fit
@@ -111,3 +112,13 @@ def test_a_roll_model_has_no_spiral() -> None:
     A = np.array([[-20.0, 0.0], [1.0, 0.0]])
     found = modes_of(model, A, np.zeros((len(model.parameters),) * 2))
     assert [m.name for m in found] == ["roll", "bank"]
+
+
+@pytest.mark.parametrize(
+    ("share", "shown"),
+    [(0.344, "34 %"), (0.098, "10 %"), (0.1004, "10.0 %"), (0.103, "10.3 %"), (0.304, "30.4 %"),
+     (0.296, "30 %"), (12.0, "> 999 %")],
+)  # fmt: skip
+def test_verdict_and_table_round_a_share_alike(share: float, shown: str) -> None:
+    """The verdict said 35 % of what the table beneath called 34 %."""
+    assert share_text(share) == shown

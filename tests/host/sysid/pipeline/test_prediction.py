@@ -320,3 +320,12 @@ def test_a_record_without_the_maneuver_names_those_it_has(saved: Path) -> None:
     other["elevator_rad"] = 0.0
     with pytest.raises(IdentificationError, match="elevator_rad; found only aileron_rad"):
         host.predict(saved, other)
+
+
+def test_list_shows_the_models_that_have_a_name(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A log called list was looked for."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["predict", "list"]) == 0
+    assert "thesis-eq5-11" in capsys.readouterr().out

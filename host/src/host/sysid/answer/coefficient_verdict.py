@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import ceil
 from typing import TYPE_CHECKING
 
 from host.sysid.answer.advised_inputs import advised_input
@@ -17,6 +16,7 @@ from host.sysid.answer.marks import (
     USELESS,
     Verdict,
     first_lines,
+    share_text,
 )
 from host.sysid.coefficients.coefficient_fit import FLAG_SHARE
 from host.sysid.coefficients.coefficient_model import standard_model
@@ -66,7 +66,7 @@ def coefficient_verdict(
         _prediction_line(answer),
     ]
     why = {
-        d.name: (f"95 % half-width {ceil(100.0 * d.share)} %", *reasons.get(d.name, ()))
+        d.name: (f"95 % half-width {share_text(d.share, FLAG_SHARE)}", *reasons.get(d.name, ()))
         for d in answer.fit.derivatives
     }
     return Verdict(heading, marks, tuple(lines), why)
@@ -87,7 +87,7 @@ def _flag_lines(answer: CoefficientAnswer, marks: Mapping[str, str]) -> list[str
             continue
         cause, part = answer.causes.get(d.name, ("", 0.0))
         why = f"{100.0 * part:.0f} % of the variance is {cause}" if cause else "excited too little"
-        lines.append(f"  {marks[d.name]} {d.name}: +- {100.0 * min(d.share, 99.99):.0f} %, {why}")
+        lines.append(f"  {marks[d.name]} {d.name}: +- {share_text(d.share, FLAG_SHARE)}, {why}")
         fly = advised_input(d.name) or "a larger input"
         advice.add(f"measure {cause} better" if cause else f"fly {fly}")
     if advice:

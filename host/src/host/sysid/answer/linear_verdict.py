@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import ceil
 
 from host.sysid.answer.advised_inputs import advised_input
 from host.sysid.answer.correlated_inputs import correlated_inputs
@@ -20,10 +19,13 @@ from host.sysid.answer.marks import (
     Verdict,
     first_lines,
     names_marked,
+    share_text,
 )
 from host.sysid.answer.servo_lines import servo_lines
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, doubts_of, unpredicted
+from host.sysid.estimators.users_model import NOISE_CHOSEN
 from host.sysid.flight.linear_answer import Answer
+from host.sysid.flight.surface_motion import HELD_SURFACES
 from host.sysid.models.diagnostics import NOT_IDENTIFIABLE, reference_values
 
 PLACE = "imu_"  # begins the name of a sensor's place: no property of the aircraft
@@ -106,7 +108,7 @@ def _all_reasons(
     flags = {r.name: r.reason for r in answer.identifiability_flags}
     found = {}
     for name in marks:
-        own = [f"95 % half-width {ceil(100.0 * shares[name])} %"]
+        own = [f"95 % half-width {share_text(shares[name])}"]
         own += [flags[name]] if name in flags else []
         own += [] if answer.result.converged else ["no convergence"]
         found[name] = (*own, *doubts.get(name, ()))
@@ -123,7 +125,7 @@ def _width_lines(
     flagged = {r.name for r in answer.identifiability_flags}
     lines = []
     wide = [
-        f"{name} ({ceil(100.0 * shares[name])} %)"
+        f"{name} ({share_text(shares[name])})"
         for name in names_marked(marks, UNSURE)
         if name not in flagged and name not in reasons
     ]
@@ -183,7 +185,10 @@ def _data_lines(answer: Answer) -> list[str]:
         f"  {name} is at its bound: no delay of that sensor, but what the model lacks there"
         for name in answer.at_bound
     ]
-    lines += [f"  warning: {warning}" for warning in answer.result.warnings]
+    lines += [
+        f"  {text}" if text.startswith((NOISE_CHOSEN, HELD_SURFACES)) else f"  warning: {text}"
+        for text in answer.result.warnings
+    ]
     poor = [f.name for f in unpredicted(answer)]
     if answer.validation:
         lines.append(

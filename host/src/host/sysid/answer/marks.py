@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 TRUST = 0.10  # 95 % half-width over value: good enough to design with
 FAIR = 0.30
+LARGEST_SHARE = 10.0  # that is printed
 # Best first.
 MARKS = TRUSTED, CAREFUL, SMALL, UNSURE, USELESS = (
     "trust", "use with care", "less than 5 % of the row", "do not rely on", "do not use",
@@ -38,6 +39,15 @@ class Verdict:
 def names_marked(marks: Mapping[str, str], mark: str) -> list[str]:
     """Return the names under a mark."""
     return [name for name, own in marks.items() if own == mark]
+
+
+def share_text(share: float, fair: float = FAIR) -> str:
+    """Return a half-width's share in per cent, a decimal where it lies just beyond a limit."""
+    if share >= LARGEST_SHARE:
+        return f"> {100.0 * LARGEST_SHARE - 1.0:.0f} %"
+    text = f"{100.0 * share:.0f}"
+    beyond = any(share > limit and text == f"{100.0 * limit:.0f}" for limit in (TRUST, fair))
+    return f"{100.0 * share:.1f} %" if beyond else f"{text} %"
 
 
 def first_lines(heading: str, marks: Mapping[str, str], fair: float) -> list[str]:

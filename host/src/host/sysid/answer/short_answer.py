@@ -9,10 +9,11 @@ from host.aircraft.gains import dimensional_name
 from host.constants import DEG_PER_RAD
 from host.sysid.answer.converted_marks import converted_marks
 from host.sysid.answer.estimate_lines import mode_lines
-from host.sysid.answer.marks import SMALL
+from host.sysid.answer.marks import FAIR, SMALL, share_text
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.trust_rules import Evidence
 from host.sysid.answer.verdict import verdict_of
+from host.sysid.coefficients.coefficient_fit import FLAG_SHARE
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.models.diagnostics import reference_values
 
@@ -90,13 +91,14 @@ def _if_worse(mark: str, of_derivative: str) -> str:
 def _direct_rows(answer: CoefficientAnswer, evidence: Evidence) -> Iterator[str]:
     marks = verdict_of(answer, evidence).marks
     for d in answer.fit.derivatives:
-        yield _row(d.name, d.value, d.half_width, "", d.share, marks[d.name], "")
+        yield _row(d.name, d.value, d.half_width, "", d.share, marks[d.name], "", FLAG_SHARE)
 
 
 def _row(
-    name: str, value: float, half_width: float, unit: str, share: float, mark: str, beside: str
-) -> str:
-    percent = f"{100.0 * share:.0f} %" if share < 10.0 else "> 999 %"
+    name: str, value: float, half_width: float, unit: str, share: float, mark: str, beside: str,
+    fair: float = FAIR,
+) -> str:  # fmt: skip
     mark = "small" if mark == SMALL else mark
+    percent = share_text(share, fair)
     text = f"  {name:12s}{value:11.5g} +- {half_width:<8.2g} {unit:8s}{percent:>7s}  {mark:15s}"
     return f"{text}{beside}".rstrip()

@@ -29,6 +29,7 @@ from host.sysid.numerics.intermittent_filter import needs_compiler
 
 GUST, FILTER = "filter-error-gust", "filter-error"
 MEMORY, WHITE = "output-error", "output-error-white"
+NOISE_CHOSEN = "noise chosen by the data"  # begins what is said of the choice
 AT_LIMIT = 1e-9
 # Samples times unknowns times signals of another delay. By filter error 420 000, six degrees of
 # freedom, take forty seconds of processor time, 950 000, flight-path reconstruction, thirteen.
@@ -118,7 +119,7 @@ def fit_by_evidence(
     seen = not any(m.held for m in maneuvers)  # a memory, between values of a slow sensor
     if memory and seen and not coloured:
         named = replace(plain.result, method="output error (white)")
-        line = "noise chosen by the data: white, it has no memory"
+        line = f"{NOISE_CHOSEN}: white, it has no memory"
         return UsersFit(WHITE, named, plain.maneuvers, remarks=(line,))
     why = no_filter(model, maneuvers)
     late = sum(bool({*d.outputs} & {*model.outputs}) for d in model.delays)  # inputs cost nothing
@@ -126,7 +127,7 @@ def fit_by_evidence(
     if not why and isinstance(model, NonlinearModel) and work > MOST_WORK:
         why = f"that would take many minutes; --method {FILTER} does it"
     if why:
-        return replace(plain, remarks=(f"noise chosen by the data: {own}; no gust tried: {why}",))
+        return replace(plain, remarks=(f"{NOISE_CHOSEN}: {own}; no gust tried: {why}",))
     try:
         moving = (
             _filter_fit(model, maneuvers, {})
@@ -134,10 +135,10 @@ def fit_by_evidence(
             else _gust_fit(model, maneuvers, airspeed_mps)
         )
     except IdentificationError as error:
-        return replace(plain, remarks=(f"noise chosen by the data: {own}; gust: {error}",))
+        return replace(plain, remarks=(f"{NOISE_CHOSEN}: {own}; gust: {error}",))
     ahead = _criterion(plain.result, maneuvers) - _criterion(moving.result, maneuvers)
     chosen, name, other = (moving, "gust", own) if ahead > 0.0 else (plain, own, "gust")
-    line = f"noise chosen by the data: {name} (BIC {abs(ahead):.0f} below that of {other})"
+    line = f"{NOISE_CHOSEN}: {name} (BIC {abs(ahead):.0f} below that of {other})"
     return replace(chosen, remarks=(line, *chosen.remarks))
 
 
