@@ -82,7 +82,8 @@ def settling_lines(answer: Answer) -> list[str]:
         ]
     timed = found.step == STEPS["history_s"]
     show, of = ("{:.2f}", "s of the data fitted") if timed else ("{:.0f}", "iteration")
-    since = ", ".join(f"{name} {show.format(when)}" for name, when in found.since.items())
+    settled = {name: when for name, when in found.since.items() if name not in found.moving}
+    since = ", ".join(f"{name} {show.format(when)}" for name, when in settled.items()) or "none"
     moving = f"; not settled: {', '.join(found.moving)}" if found.moving else ""
     lines = [
         f"  settled, within 10 % of its end, since ({of}, of {show.format(found.end)}): "
