@@ -68,9 +68,17 @@ def test_coefficients_are_refused_without_vanes(
     err = capsys.readouterr().err
     assert code == 2
     assert "no vane measured the angle of attack" in err
-    code = main(["identify", str(path), "--model", "longitudinal"])
-    assert code == 2
-    assert "without vanes the angle of attack was not measured" in capsys.readouterr().err
+
+
+def test_longitudinal_without_vanes_is_fitted_and_not_trusted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It was refused, though az tells the angle."""
+    path = write("dataflash", tmp_path)
+    assert main(["identify", str(path), "--model", "longitudinal"]) == 0
+    out = capsys.readouterr().out
+    assert "trust (within 10 %):  nothing" in out
+    assert "it is told by az_mps2 and rates" in out
 
 
 def test_surfaces_are_scaled_by_the_aircraft_file_only(tmp_path: Path) -> None:
