@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 from functools import lru_cache
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -29,6 +31,7 @@ from host.sysid.compatibility.reconstruction import (
 from host.sysid.compatibility.sensor_dynamics import vane_delay_of
 from host.sysid.compatibility.strapdown import rotation, strapdown
 from host.sysid.identification_error import IdentificationError
+from host.sysid.numerics.output_error_problem import Response
 from host.twin.flight.fly import FlightRecord
 from host.twin.sensors.sensor_delays import FILTERS, sensor_delays
 
@@ -209,6 +212,30 @@ def test_gusts_do_not_pass_for_vanes_that_under_read() -> None:
         faults.append(plain.theta[place] - true["alpha_scale"])
     assert abs(np.mean(errors)) < 0.02
     assert abs(np.mean(faults)) > 2.0 * abs(np.mean(errors))
+
+
+def test_steps_to_and_fro_settle() -> None:
+    """Slopes half of the true ones turn every step back: 4 of 34 right records ended so."""
+    t = np.linspace(0.0, 1.0, 50)[:, None]
+    measured = 3.0 * t.T + 0.01 * np.random.default_rng(1).standard_normal((1, 50))
+
+    def respond(theta: np.ndarray) -> list[Response]:
+        return [Response(theta * t.T, (t / 2.1)[None])]
+
+    problem = SimpleNamespace(
+        prior_mean=np.zeros(1),
+        prior_precision=np.array([0.01]),
+        model=SimpleNamespace(outputs=(HEIGHT,)),
+        names=("height",),
+        common=("height",),
+        respond=respond,
+        measured=lambda _: measured,
+        counted=lambda _: len(t),
+        columns=lambda _: np.array([0]),
+    )
+    fit = fit_path(cast(PathProblem, problem), [t])
+    assert fit.converged
+    assert fit.theta[0] == pytest.approx(3.0, abs=0.02)
 
 
 def test_a_surface_that_stands_still_tells_nothing_and_spoils_nothing() -> None:
