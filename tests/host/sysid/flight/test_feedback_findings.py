@@ -102,6 +102,33 @@ def test_a_bank_loop_whose_command_jumps_is_named_and_takes_nothing(seed: int) -
     assert found_in(flown("lateral", inputs, None, seed)) == []
 
 
+def guided(seed: int, jumps: int) -> Columns:
+    """Return a bank loop under a command that wanders, and jumps a few times."""
+    t, rng = DT_S * np.arange(SAMPLES), np.random.default_rng(seed)
+    command = sum(0.05 * np.sin(2.0 * np.pi * f * t + rng.uniform(0.0, 6.0)) for f in (0.11, 0.23))
+    steps = np.repeat(rng.uniform(-0.1, 0.1, jumps + 1), SAMPLES // (jumps + 1))
+    law = Law("aileron_rad", {"p_radps": -0.06, "phi_rad": -0.5})
+    columns = flown("lateral", {"aileron_rad": command + steps}, law, seed, gust_rad=0.03)
+    # An autopilot acts on what its own sensors, which are logged, said 40 ms before.
+    followed = sum(np.roll(gain * columns[name], 2) for name, gain in law.gains.items())
+    return columns | {"aileron_rad": command + steps + followed}
+
+
+@pytest.mark.parametrize(("seed", "jumps"), [(1, 0), (2, 0), (1, 3), (2, 3)])
+def test_an_inner_loop_is_named_whatever_moves_its_command(seed: int, jumps: int) -> None:
+    """A distance from a line is no column: what the loop does quicker tells its law."""
+    [found] = found_in(guided(seed, jumps))
+    assert "about a command that changes slowly" in found.text
+    assert {"p_radps", "phi_rad"} <= set(found.text.split(" at ")[0].split())
+    assert found.feedback is None  # it moves by itself, and no force depends on bank
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_an_input_that_wanders_and_jumps_is_no_inner_loop(seed: int) -> None:
+    open_loop = {"aileron_rad": guided(seed, 3)["aileron_rad"][::-1].copy()}
+    assert found_in(flown("lateral", open_loop, None, seed, gust_rad=0.03)) == []
+
+
 @pytest.mark.parametrize(("seed", "leg_s"), [(19500, 12.0), (19502, 12.0), (19500, 4.0)])
 def test_a_tracker_is_named_where_heading_is_no_column(seed: int, leg_s: float) -> None:
     """The rates tell it, but for a drift; without them bank alone is no law.
@@ -146,11 +173,18 @@ def test_a_surface_that_rests_follows_nothing() -> None:
     assert found_in(still) == []
 
 
-def test_the_yaw_damper_of_a_real_aircraft() -> None:
-    """Its rudder is 0.066 r behind a wash-out of 0.5 s, to four digits."""
+def test_the_laws_of_a_real_aircraft() -> None:
+    """Its rudder is 0.066 r behind a wash-out of 0.5 s, to four digits.
+
+    Its ailerons and elevator hold attitudes that its guidance wants.
+    """
     folder = ROOT / "tests/data/thor75"
     read = read_flight_columns(folder / "flight75_240_270.csv", folder / "map.toml")
-    [found] = found_in(read.columns)
+    elevator, ailerons, found = found_in(read.columns)
+    for held, surface, rate in ((elevator, "elevator", "q"), (ailerons, "aileron", "p")):
+        assert held.text.startswith(f"{surface}_rad follows {rate}_radps and ")
+        assert held.text.endswith(", about a command that changes slowly")
+        assert held.feedback is None
     assert found.text == (
         "rudder_rad follows r_radps at 0 ms through a wash-out of 0.5 s, R2 1.00: N_dr and N_r"
         " cannot be told apart"

@@ -11,6 +11,7 @@ from host.arrays import Array, IntArray
 from host.sysid.flight.data_finding import Feedback, Finding
 from host.sysid.flight.maneuver_detection import LEAD_S, DetectedManeuver, runs_of
 from host.sysid.flight.maneuver_selection import FEWEST
+from host.sysid.numerics.feedback_fast import fast_feedback
 from host.sysid.numerics.feedback_legs import feedback_legs
 from host.sysid.numerics.state_feedback import FeedbackLaw, feedback_law
 
@@ -28,12 +29,18 @@ ATTITUDE = ("phi_rad", "theta_rad", "psi_rad", "altitude_m")
 # of a pilot moves the other way.
 HOLDING = {
     ("elevator_rad", "q_radps"): 1, ("elevator_rad", "alpha_rad"): 1,
+    ("elevator_rad", "theta_rad"): 1,
     ("aileron_rad", "p_radps"): -1, ("aileron_rad", "phi_rad"): -1,
     ("aileron_rad", "psi_rad"): -1,
     ("rudder_rad", "r_radps"): 1, ("rudder_rad", "beta_rad"): -1,
 }  # fmt: skip
 # What a waypoint tracker's bank loop follows in every leg, and what in some.
 BANK_LOOP, HEADING = ("p_radps", "phi_rad"), "psi_rad"
+# What holds an attitude whose command is not in the table: rate, attitude, and what may be beside.
+INNER_LOOP: dict[str, tuple[str, ...]] = {
+    "aileron_rad": ("p_radps", "phi_rad", "psi_rad"),
+    "elevator_rad": ("q_radps", "theta_rad", "alpha_rad"),
+}
 TURNING = ("q_radps", "r_radps", "phi_rad", "theta_rad")  # tell how heading changes
 MOMENT = {"elevator_rad": "M", "aileron_rad": "L", "rudder_rad": "N"}
 LABEL = {
@@ -72,6 +79,8 @@ def _finding(
     law, jumps = _law(columns, windows, surface, names), ""
     if law is None and surface == "aileron_rad":
         law, jumps = _tracker(columns, windows)
+    if law is None:
+        law, jumps = _inner_loop(columns, windows, surface)
     if law is None:
         return None
     aerodynamic: FeedbackLaw | None = law
@@ -157,6 +166,27 @@ def _tracker(
         return None, ""
     by_rates = ", heading by rates" if HEADING in law.signals and HEADING not in columns else ""
     return law, f" within {len(legs)} legs of constant command{by_rates}"
+
+
+def _inner_loop(
+    columns: Mapping[str, Array], windows: Sequence[IntArray], surface: str
+) -> tuple[FeedbackLaw | None, str]:
+    """Return the law of a surface whose command no column tells, and that in words.
+
+    A guidance by the distance from a line or by a waypoint moves it slowly. What an aircraft
+    answers to a pilot has the other sign.
+    """
+    names = INNER_LOOP.get(surface, ())
+    if not names or not windows or any(name not in columns for name in names[:2]):
+        return None, ""
+    signals = {n: columns[n] for n in names if n in columns}
+    law = fast_feedback(_period_s(columns), columns[surface], signals, windows)
+    if law is None or names[1] not in law.signals:
+        return None, ""
+    gains = zip(law.signals, law.gains, strict=True)
+    if any(HOLDING[surface, name] * gain < 0.0 for name, gain in gains):
+        return None, ""
+    return law, ", about a command that changes slowly"
 
 
 def _heading(columns: Mapping[str, Array]) -> Array | None:
