@@ -225,6 +225,15 @@ def test_a_channel_with_an_open_finding_is_not_relied_on(
     assert any(line.endswith(words) for line in verdict_lines([right], [], evidence))
 
 
+def test_an_airspeed_in_doubt_takes_the_forces_over_it() -> None:
+    """It is no state of the model: nothing was taken, and half of Y_beta stood under "trust"."""
+    answer = answer_to(fly("lateral", "none", "white", 1), "lateral")
+    evidence = Evidence((answer,), (Finding("beta-against-ay", ("airspeed_mps",), "in kt?"),))
+    lost = relied_on(answer) - relied_on(answer, evidence)
+    assert lost
+    assert {name[0] for name in lost} == {"Y"}
+
+
 def test_every_reason_is_in_the_words_and_in_the_document(right: Answer) -> None:
     found = Finding("surface-sign", ("elevator_rad",), "the elevator works backwards")
     evidence = Evidence((right,), (found,))

@@ -24,12 +24,14 @@ from host.sysid.answer.parameter_places import leaning_on
 from host.sysid.flight.data_finding import Finding, open_channels
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.prediction_limits import Prediction
+from host.sysid.flight.systematic_errors import is_template, scaled_by_airspeed
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 
+AIRSPEED = "airspeed_mps"
 FAILS = 0.5  # NRMSE of an output: a quarter of its variance is not explained
 WORSE_THAN_NONE = 1.0  # NRMSE: the mean would do better
 # Of power along what inputs drive over that of noise: half-widths are more than doubled by it.
@@ -167,8 +169,26 @@ def open_finding(answer: Answer, evidence: Evidence) -> list[Doubt]:
     return [
         one
         for channel, check in open_channels(evidence.findings).items()
-        for one in _about(answer, [channel], f"{channel} has an open finding ({check})")
+        for one in _named(
+            answer,
+            leaning_on(answer.model, {channel}) | _divided_by(answer, channel),
+            f"{channel} has an open finding ({check})",
+        )
     ]
+
+
+def _divided_by(answer: Answer, channel: str) -> set[str]:
+    """Return the parameters that a column scales beside its own equation.
+
+    Airspeed is in the numbers of a model, where it is no state: the templates have forces over it.
+    With an aircraft file dynamic pressure turns every derivative into a coefficient.
+    """
+    if channel != AIRSPEED:
+        return set()
+    if answer.coefficient_parts is not None:
+        return {p.name for p in answer.model.parameters}
+    known = answer.trim.known and is_template(answer.model, answer.trim)
+    return scaled_by_airspeed(answer.model, answer.trim) if known else set()
 
 
 def input_feedback(answer: Answer, evidence: Evidence) -> list[Doubt]:

@@ -10,7 +10,7 @@ answer gusts prove nothing either.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,12 +21,13 @@ from host.sysid.flight.identity_factors import LARGEST_FACTOR, Identity
 from host.sysid.numerics.first_order_filter import first_order_filter
 
 PAST_STEPS = 6  # of what is left, that tell the next
-LAGS_STEPS = (0.0, 1.5, 4.0, 10.0, 30.0)  # of first order, behind a surface
+LAGS_STEPS = (0.0, 1.5, 4.0, 10.0, 30.0, 100.0)  # of first order, behind a surface
 ROWS_EACH = 8  # for each number that is fitted: with fewer it explains gusts too
 SENSOR_SHARE, SENSOR_DELAY_S = 0.1, 0.03  # scale, delay and place of right sensors, one deviation
 UNKNOWN_SHARE = 0.1  # of a motion, that they make of it in other ways
 SHORTEST_S = 20.0  # a trend of a shorter record is explained by chance
 CERTAIN = 9.0  # of a chi-square of one unknown: three deviations
+LIKELIER = 1.0  # of the same, one deviation: below it nothing is told of two units
 CERTAIN_P = 0.0027  # the same, as what chance exceeds
 RIGHT = (1.0 / LARGEST_FACTOR, 1.0, LARGEST_FACTOR)
 TRIED = tuple(10.0 ** (0.1 * k) for k in range(-20, 21))
@@ -149,6 +150,22 @@ def shared_factor(shares: Sequence[tuple[Identity, str]], tried: Iterable[float]
     broken = {f: sum(test.misfit(name, f) for test, name in tests) for f in tried}
     slope = min(broken, key=broken.__getitem__)
     return slope if whole - broken[slope] > CERTAIN else None
+
+
+def likelier_factor(
+    shares: Sequence[tuple[Identity, str]], tried: Collection[float]
+) -> float | None:
+    """Return the factor with which parts of several identities agree better than as they are.
+
+    No proof: the likeliest of those tried, None where all explain less of what surfaces drive. The
+    arguments are those of `shared_factor`.
+    """
+    tests = [(_Test(law), name) for law, name in shares if law.driven and _testable(law)]
+    if not tests:
+        return None
+    broken = {f: sum(test.misfit(name, f) for test, name in tests) for f in (1.0, *tried)}
+    slope = min(broken, key=broken.__getitem__)
+    return slope if broken[1.0] - broken[slope] > LIKELIER else None
 
 
 def _testable(law: Identity) -> bool:

@@ -23,6 +23,7 @@ from host.sysid.flight.driven_motion import (
     DrivenFactor,
     driven_factors,
     driven_misfit,
+    likelier_factor,
     shared_factor,
 )
 from host.sysid.flight.identity_factors import (
@@ -220,11 +221,33 @@ def _judge_airspeed(laws: Sequence[Identity]) -> list[Finding]:
     gains = [gain for gain in UNITS["mps"].values() if gain != 1.0]
     times = shared_factor(parts, [*gains, *(1.0 / gain for gain in gains)])
     if times is None:
-        return []
+        sides = [(law, "ay_mps2") for law in laws if "ay_mps2" in law.terms]
+        by_speed = {1.0 / gain: unit for unit, gain in UNITS["mps"].items() if gain != 1.0}
+        # That a side force is too little shows, as in g; that it is too much does not.
+        by_force = {gain: unit for unit, gain in UNITS["mps2"].items() if gain > 1.0}
+        both = (("airspeed_mps", parts, by_speed), ("ay_mps2", sides, by_force))
+        return [one for name, shares, units in both for one in _likelier_unit(name, shares, units)]
     channels = dict.fromkeys(c for _, name in parts for c in reversed(_channels(name)))
     text = f"airspeed_mps is about {times:.2g} times what forces make of it in what surfaces drive"
     causes = (f"{UNIT}: {HINT}", "scales of vanes or airspeed")
     return [Finding("alpha-against-az", (*channels,), text, causes, wrong_unit=True)]
+
+
+def _likelier_unit(
+    name: str, shares: Sequence[tuple[Identity, str]], units: Mapping[float, str]
+) -> list[Finding]:
+    """Return the finding of a column that nothing proves wrong, but agrees better in another unit.
+
+    Gusts may leave it open whether an airspeed is in m/s or in knots. That is no reading, but what
+    the column scales is not to be trusted.
+    """
+    likelier = likelier_factor(shares, units)
+    if likelier is None:
+        return []
+    law, part = next((law, part) for law, part in shares if law.driven)
+    check = CHECK_OF[law.name, part]
+    text = f"{name} would agree better with what surfaces drive if it were in {units[likelier]}"
+    return [Finding(check, (name,), text, (f"its unit: {HINT}", "gusts"))]
 
 
 def _factor_causes(f: Factor) -> tuple[str, ...]:

@@ -183,3 +183,10 @@ def retrimmed(model: LinearModel, trim: Trim) -> LinearModel:
     own = without_gust_penetration(model)
     bent = replace(own, A=fresh.A, B=fresh.B, C=fresh.C, D=fresh.D, terms=fresh.terms)
     return penetration_of(bent, model)
+
+
+def scaled_by_airspeed(model: LinearModel, trim: Trim) -> set[str]:
+    """Return the parameters of a template that are forces over airspeed."""
+    faster = replace(trim, airspeed_mps=2.0 * trim.airspeed_mps)
+    bent = set(retrimmed(model, faster).terms)
+    return {term.parameter for term in model.terms if term.matrix in "CD" and term not in bent}
