@@ -28,6 +28,7 @@ from host.sysid.models.templates import Trim, template
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
+from studies import wrong_flights
 from studies.foreign.flight import derivatives as foreign_derivatives
 from studies.foreign.flight import fly as fly_foreign
 from studies.independent import cells
@@ -220,3 +221,14 @@ def test_a_fit_that_ran_away_is_one_line(
     monkeypatch.setattr(linear_estimator, "fit", ran_away)
     with pytest.raises(IdentificationError, match="the covariance is not finite; these data do no"):
         identify(columns, names=("lateral",), windows=windows(maneuvers))
+
+
+def test_a_linear_record_has_no_departures() -> None:
+    """Level flight guessed in place of q bent it: L_p was known to 1.4 % and inputs drove p."""
+    flight = wrong_flights.fly("lateral", "none", "white", 1)
+    [answer] = identify(
+        flight.columns, names=("lateral",), method="output-error", windows=flight.windows
+    )
+    assert answer.coherence is not None and not answer.coherence.suspected
+    k = answer.result.index("L_p")
+    assert answer.result.half_width()[k] < 0.007 * abs(answer.result.estimate[k])

@@ -40,10 +40,10 @@ from host.sysid.aerodynamics.left_out_terms import (
 )
 from host.sysid.aerodynamics.path_thrust import rotor_means
 from host.sysid.aerodynamics.unmeasured_motion import with_unmeasured
-from host.sysid.aerodynamics.varying_airspeed import SECOND_ORDER_TERMS, VaryingModel
+from host.sysid.aerodynamics.varying_airspeed import MEASURED, SECOND_ORDER_TERMS, VaryingModel
 from host.sysid.estimators.gust_model import gust_deviation_mps
 from host.sysid.flight.column_noise import white_deviation
-from host.sysid.flight.one_step import one_step_of
+from host.sysid.flight.one_step import OneStep, one_step_of
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
@@ -65,6 +65,9 @@ TURNING_SHARE = 0.8
 # Of D_alpha_alpha over V Z_alpha, which is 2 C_D_CL2 C_L_alpha of a parabolic polar: 0.3 to 1.
 LARGEST_CURVATURE = 3.0
 NO_SPIN = (0.0, 0.0)
+HALF_WAY = 0.5  # of the departures: with less a record is nearer to a linear one
+CERTAIN_SD = 2.0  # deviations
+LOOSE_SHARE = 10.0  # of the departures, one deviation
 DRAWS = 4  # of the noise of the airspeed, each anew in every maneuver
 
 
@@ -230,7 +233,7 @@ def correct_trim_departure(
     Returns
     -------
     Departure or None
-        None where departures of the model are not known, or not measured.
+        None where departures of the model are not known, not measured, or guessed and not there.
     """
     base = result.model
     if not departures_measured(base.name, cuts):
@@ -238,6 +241,7 @@ def correct_trim_departure(
     left_out = terms_left_out(base.name, cuts[0], trim)
     if not trim.known:
         trim = replace(trim, airspeed_mps=UNKNOWN_MPS)
+    assumed = any(c not in cut for cut in cuts for c in MEASURED)
     cuts = [with_unmeasured(c, base, result.estimate, trim) for c in cuts]
     one_step = one_step_of(result, maneuvers if fitted is None else fitted, trim)
     if one_step is None:
@@ -251,6 +255,8 @@ def correct_trim_departure(
         replace(m, inputs=varying.maneuver(c, m.dt_s).inputs)
         for m, c in zip(maneuvers, cuts, strict=True)
     ]
+    if assumed and not left_out and _linear(one_step, result, maneuvers, straight, data, trim):
+        return None
     bends = [(model, data) for model in curved]
     found = one_step.joint(straight, trim, data, bends, list(curvature.values()))
     if not np.isfinite(found.shares).all():
@@ -287,6 +293,27 @@ def correct_trim_departure(
         tuple(data),
         beside,
     )
+
+
+def _linear(
+    one_step: OneStep,
+    result: FitResult,
+    maneuvers: Sequence[Maneuver],
+    departing: LinearModel,
+    data: Sequence[Maneuver],
+    trim: Trim,
+) -> bool:
+    """Return whether the record has no departures, as a linear simulator's.
+
+    Of columns that nobody measured they are a guess. How much of them is there is one more
+    parameter: of a linear lateral record in white noise what they added was not there, and the
+    test of coherence widened L_p 2.6 times.
+    """
+    wider = one_step.widened_in(result)
+    whole = [(departing, data)]
+    step = one_step.joint(result.model, trim, maneuvers, whole, [LOOSE_SHARE / wider])
+    share, sd = float(step.added[0]), wider * float(np.sqrt(step.covariance[0, 0]))
+    return share < HALF_WAY and 1.0 - share > CERTAIN_SD * sd
 
 
 def departures_measured(name: str, cuts: Sequence[Mapping[str, Array]]) -> bool:
