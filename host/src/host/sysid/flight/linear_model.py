@@ -21,8 +21,6 @@ from host.sysid.identification_error import IdentificationError
 from host.sysid.models.residual_delays import STANDARD_DELAYS, without_standard_delays
 from host.sysid.models.state_space_model import (
     LinearModel,
-    Parameter,
-    Term,
     without_inputs,
     without_outputs,
 )
@@ -46,9 +44,6 @@ NO_AIRSPEED = (
     "the data have no airspeed_mps: it is taken as constant; accelerations, gusts and coefficients"
     " need it and are left out"
 )
-# Z_q in Z_alpha: chord over twice the airspeed times C_L_q over C_L_alpha. 0.009 s for a trainer of
-# 4 kg, 0.011 for the Ultra Stick, up to 0.02 for an airliner, none without a tail: mean, deviation.
-PITCHING_LIFT_S = (0.01, 0.007)
 STILL_RAD = 1e-9  # a surface that moves less stands still but for rounding
 # One equation at a time: accelerations repeat the entries of others, and are left out.
 UNTIED = ("equation-error-total", "recursive", "neural-delta")
@@ -156,8 +151,6 @@ def fitted_template(
     A flying wing has no rudder, and a surface that stood still says nothing.
     """
     model, remarks = without_vanes(template_at(columns, name, trim, method, able=able), columns)
-    if frees_places(method):
-        model = with_pitching_lift(model, used)
     remarks += () if trim.known else (NO_AIRSPEED,)
     absent = [u for u in model.inputs if u not in columns]
     still = [
@@ -202,27 +195,6 @@ def with_drag_arm(model: LinearModel, trim: Trim, i: SensorErrorModel) -> Linear
         model,
         accelerometer_offsets=tuple(kept),
         parameters=tuple(p for p in free.parameters if p.name not in names),
-    )
-
-
-def with_pitching_lift(model: LinearModel, used: Sequence[FlownManeuver]) -> LinearModel:
-    """Return the model with Z_q, by its prior, where no accelerometer tells it.
-
-    Without any, 0.08 of it passed for a scale of alpha: M_alpha of a trainer was known to 53 %.
-    """
-    wanted = {"alpha_rad", "q_radps"}
-    if "Z_q" in model.parameter_names or not wanted <= {*model.states} & {*model.outputs}:
-        return model
-    data = [m.cut(model) for m in used]
-    lift = regression_estimates(replace(model, delays=()), data).get("Z_alpha", 0.0)
-    mean, sd = (share_s * min(lift, 0.0) for share_s in PITCHING_LIFT_S)
-    if sd == 0.0:
-        return model
-    place = model.states.index("alpha_rad"), model.states.index("q_radps")
-    return replace(
-        model,
-        parameters=(Parameter("Z_q", mean, prior_sd=-sd), *model.parameters),
-        terms=(Term("A", *place, "Z_q"), *model.terms),
     )
 
 

@@ -255,7 +255,11 @@ def correct_trim_departure(
         replace(m, inputs=varying.maneuver(c, m.dt_s).inputs)
         for m, c in zip(maneuvers, cuts, strict=True)
     ]
-    if assumed and not left_out and _linear(one_step, result, maneuvers, straight, data, trim):
+    # Without accelerometers the lift of pitching passes for a scale of alpha: nothing is guessed.
+    guessed = assumed and not left_out
+    if guessed and not varying.forces:
+        return None
+    if guessed and _linear(one_step, result, maneuvers, straight, data, trim):
         return None
     bends = [(model, data) for model in curved]
     found = one_step.joint(straight, trim, data, bends, list(curvature.values()))
