@@ -21,6 +21,8 @@ from host.sysid.models.templates import Trim
 from host.sysid.numerics.nonlinear_problem import output_problem
 
 SINGULAR = 1e-12  # of the largest eigenvalue of the scaled information
+HALF_WAY = 0.5  # from one model or data to another: beyond it the record is nearer to the other
+CERTAIN_SD = 2.0  # deviations
 
 Residuals = Callable[[LinearModel, Trim, Sequence[Maneuver]], "list[Array] | None"]
 
@@ -136,6 +138,32 @@ class OneStep:
             step = step + consider_sensitivity @ added
         sensitivity = self._placed(consider_sensitivity.sum(axis=0).T)
         return Step(self._placed(step), added, covariance, sensitivity)
+
+    def share_of(
+        self,
+        other: tuple[LinearModel, Sequence[Maneuver]],
+        result: FitResult,
+        trim: Trim,
+        data: Sequence[Maneuver],
+        prior_sd: float,
+    ) -> tuple[float, float]:
+        """Return how far a record goes from its model and data to others, and one deviation.
+
+        Parameters
+        ----------
+        other : LinearModel and sequence of Maneuver
+            All the way there.
+        result : FitResult
+            Its model is where the way begins.
+        trim : Trim
+        data : sequence of Maneuver
+            Where the way begins.
+        prior_sd : float
+            About zero.
+        """
+        wider = self.widened_in(result)
+        step = self.joint(result.model, trim, data, [other], [prior_sd / wider])
+        return float(step.added[0]), wider * float(np.sqrt(step.covariance[0, 0]))
 
     def widened_in(self, result: FitResult) -> float:
         """Return by how much the intervals of a result are wider than white noise makes them: the

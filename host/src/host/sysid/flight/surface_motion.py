@@ -19,7 +19,7 @@ from host.constants import NORMAL_95
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
 from host.sysid.estimators.method_registry import fit
 from host.sysid.flight.filter_step import others_recorded
-from host.sysid.flight.one_step import Step, one_step_of
+from host.sysid.flight.one_step import CERTAIN_SD, HALF_WAY, one_step_of
 from host.sysid.flight.reconstructed_flight import FlownManeuver
 from host.sysid.flight.sampling_error import HOLD
 from host.sysid.identification_error import IdentificationError
@@ -32,8 +32,6 @@ from host.sysid.numerics.between_samples import OTHER_HOLD
 # Of what kinks do to the estimate, one deviation: a servo of second order and 60 rad/s has none,
 # and passes for one of first order that does half as much.
 KINK_SHARE = 0.5
-HALF_WAY = 0.5  # from lines to the motion of servos: beyond it the motion is nearer
-CERTAIN_SD = 2.0  # deviations
 LINES, SERVOS, HELD = "on lines", "as servos do", "held"
 HELD_SURFACES = "surfaces were held from sample to sample, as the outputs show"
 TINY = 1e-12
@@ -83,19 +81,16 @@ def between_samples(
     found = one_step_of(result, data, trim, [d.name for d in model.delays])
     if found is None:
         return LINES
-    wider = found.widened_in(result)
     bent = (model, [m.cut(model) for m in with_moving_surfaces(used)])
     held = (replace(model, hold=OTHER_HOLD[model.hold]), data)
     # Held surfaces jump, which also bends: what explains more is the motion.
-    steps = [found.joint(model, trim, data, [one], [1.0 / wider]) for one in (bent, held)]
-    likely = [_whole_way(step, wider) for step in steps]
+    likely = [_whole_way(*found.share_of(one, result, trim, data, 1.0)) for one in (bent, held)]
     best = int(np.argmax(likely))
     return (SERVOS, HELD)[best] if likely[best] > 0.0 else LINES
 
 
-def _whole_way(step: Step, wider: float) -> float:
+def _whole_way(share: float, sd: float) -> float:
     """Return the deviations from lines to a motion if that is what the data show, else none."""
-    share, sd = float(step.added[0]), wider * float(np.sqrt(step.covariance[0, 0]))
     return share / max(sd, TINY) if share > max(HALF_WAY, CERTAIN_SD * sd) else 0.0
 
 

@@ -43,7 +43,7 @@ from host.sysid.aerodynamics.unmeasured_motion import with_unmeasured
 from host.sysid.aerodynamics.varying_airspeed import MEASURED, SECOND_ORDER_TERMS, VaryingModel
 from host.sysid.estimators.gust_model import gust_deviation_mps
 from host.sysid.flight.column_noise import white_deviation
-from host.sysid.flight.one_step import OneStep, one_step_of
+from host.sysid.flight.one_step import CERTAIN_SD, HALF_WAY, OneStep, one_step_of
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
@@ -65,8 +65,6 @@ TURNING_SHARE = 0.8
 # Of D_alpha_alpha over V Z_alpha, which is 2 C_D_CL2 C_L_alpha of a parabolic polar: 0.3 to 1.
 LARGEST_CURVATURE = 3.0
 NO_SPIN = (0.0, 0.0)
-HALF_WAY = 0.5  # of the departures: with less a record is nearer to a linear one
-CERTAIN_SD = 2.0  # deviations
 LOOSE_SHARE = 10.0  # of the departures, one deviation
 DRAWS = 4  # of the noise of the airspeed, each anew in every maneuver
 
@@ -247,6 +245,10 @@ def correct_trim_departure(
     if one_step is None:
         return None
     varying = VaryingModel(base, base.name, trim, airframe, spin, left_out)
+    # Without accelerometers the lift of pitching passes for a scale of alpha: nothing is guessed.
+    guessed = assumed and not left_out
+    if guessed and not varying.forces:
+        return None
     straight = _with_second_order(varying.model, base, {})
     beside = _left_out(result, left_out)
     curvature = _curvature_sd(result, trim) | {name: sd for name, (_, sd) in beside.items()}
@@ -255,10 +257,6 @@ def correct_trim_departure(
         replace(m, inputs=varying.maneuver(c, m.dt_s).inputs)
         for m, c in zip(maneuvers, cuts, strict=True)
     ]
-    # Without accelerometers the lift of pitching passes for a scale of alpha: nothing is guessed.
-    guessed = assumed and not left_out
-    if guessed and not varying.forces:
-        return None
     if guessed and _linear(one_step, result, maneuvers, straight, data, trim):
         return None
     bends = [(model, data) for model in curved]
@@ -313,10 +311,8 @@ def _linear(
     parameter: of a linear lateral record in white noise what they added was not there, and the
     test of coherence widened L_p 2.6 times.
     """
-    wider = one_step.widened_in(result)
-    whole = [(departing, data)]
-    step = one_step.joint(result.model, trim, maneuvers, whole, [LOOSE_SHARE / wider])
-    share, sd = float(step.added[0]), wider * float(np.sqrt(step.covariance[0, 0]))
+    whole = (departing, data)
+    share, sd = one_step.share_of(whole, result, trim, maneuvers, LOOSE_SHARE)
     return share < HALF_WAY and 1.0 - share > CERTAIN_SD * sd
 
 
