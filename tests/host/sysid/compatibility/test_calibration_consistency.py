@@ -14,10 +14,12 @@ from host.sysid.compatibility.calibration_consistency import (
 )
 from host.sysid.compatibility.path_preparation import prior
 from host.sysid.compatibility.reconstruction import (
+    Compatibility,
     compatibility_document,
     compatibility_lines,
     reconstruct,
 )
+from host.sysid.flight.agreement_findings import calibration_findings
 
 from tests.host.sysid.recorded import NAME, flown, reconstructed
 
@@ -63,6 +65,19 @@ def test_a_doubted_file_is_named_with_the_errors_it_claims_too_small() -> None:
     (line,) = calibration_lines(found)
     assert "gyro_scale 3.1 times" in line
     assert "vane_scale" not in line
+
+
+def test_where_no_error_alone_is_too_large_it_may_be_any() -> None:
+    """With an airspeed 10 % high all were 2.1 times their file, and no column was in doubt."""
+    every = ConsistencyTest("all", 2.1, 17, SIGNIFICANCE / 10.0)
+    agreement = Compatibility((), {}, (), True, calibration_tests=(
+        every,
+        ConsistencyTest("gyro_scale", 1.6, 3, 0.02),
+        ConsistencyTest("pitot_scale", 2.0, 1, 0.05),
+    ))  # fmt: skip
+    [finding] = calibration_findings(agreement)
+    assert "all errors together 2.1 times" in finding.text
+    assert {"airspeed_mps", "alpha_rad", "az_mps2", "q_radps"} <= set(finding.channels)
 
 
 def test_a_recorded_flight_doubts_a_file_that_claims_a_fifth_and_no_honest_one() -> None:

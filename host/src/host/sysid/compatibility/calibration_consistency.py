@@ -24,6 +24,7 @@ OBSERVABLE_GROUPS: dict[str, tuple[str, ...]] = {
     "pitot_zero_pa": PITOT[1:],
     "place_m": PLACES,
 }
+ALL = "all"  # name of the test of all groups together
 SIGNIFICANCE = 0.01  # of the test: how often a correct file may be rejected
 # Reduction of the prior variance from which a direction counts. Below a half an estimate rests
 # on the prior, and noise larger than reckoned shows: the vanes' height from the IMU, told to 0.4,
@@ -84,7 +85,7 @@ def consistency_tests(
     z = (found - mean) / sd
     P = covariance / np.outer(sd, sd)
     return tuple(
-        _consistency_test(name, own, z, P) for name, own in (("all", every), *groups.items()) if own
+        _consistency_test(name, own, z, P) for name, own in ((ALL, every), *groups.items()) if own
     )
 
 
@@ -100,14 +101,27 @@ def _consistency_test(name: str, own: Sequence[int], z: Array, P: Array) -> Cons
     )
 
 
-def calibration_lines(found: Sequence[ConsistencyTest]) -> list[str]:
-    """Return the verdict's lines on a file that states too little; none if it is consistent."""
+def inconsistent_groups(found: Sequence[ConsistencyTest]) -> list[ConsistencyTest]:
+    """Return the groups of a file that states too little; none if it is consistent.
+
+    Where no group alone is too large, all together stand for them: it may be any.
+    """
     if not found or not found[0].rejected:
         return []
-    named = [c for c in found[1:] if c.rejected]
-    worst = named or sorted(found[1:], key=lambda c: c.probability)[:1]
-    parts = ", ".join(f"{c.name} {c.rms_ratio:.1f} times" for c in worst)
+    return [c for c in found[1:] if c.rejected] or list(found[:1])
+
+
+def calibration_lines(found: Sequence[ConsistencyTest]) -> list[str]:
+    """Return the verdict's lines on a file that states too little; none if it is consistent."""
+    worst = inconsistent_groups(found)
+    if not worst:
+        return []
+    parts = ", ".join(f"{_in_words(c.name)} {c.rms_ratio:.1f} times" for c in worst)
     return [
         f"the calibration claims less than this flight shows: {parts}; intervals are too narrow:"
         " calibrate again, or state larger deviations"
     ]
+
+
+def _in_words(group: str) -> str:
+    return "all errors together" if group == ALL else group

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from host.sysid.compatibility.calibration_consistency import calibration_lines
+from host.sysid.compatibility.calibration_consistency import (
+    ALL,
+    calibration_lines,
+    inconsistent_groups,
+)
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.flight.data_finding import Finding
 
@@ -28,8 +32,9 @@ def calibration_findings(agreement: Compatibility) -> list[Finding]:
     lines = calibration_lines(tests)
     if not lines:
         return []
-    named = [test.name for test in tests[1:] if test.rejected]
-    channels = [k for name in named for k in MOVED[name.split("_")[0]]]
+    named = [test.name for test in inconsistent_groups(tests)]
+    groups = MOVED if ALL in named else [name.split("_")[0] for name in named]
+    channels = [k for group in groups for k in MOVED[group]]
     causes = ("a calibration that is another instrument's", "wind that changes", "a wrong unit")
     done = "intervals rest on the file all the same"
     return [Finding("calibration", tuple(dict.fromkeys(channels)), lines[0], causes, done)]

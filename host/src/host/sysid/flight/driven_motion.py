@@ -10,7 +10,7 @@ answer gusts prove nothing either.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,6 +47,25 @@ class DrivenFactor:
 
 
 @dataclass(frozen=True, slots=True)
+class SensorTolerances:
+    """One deviation of right sensors.
+
+    Attributes
+    ----------
+    shares : mapping
+        Of the scale of each part, and of the rate ("").
+    delays : float
+        Of delays, times those of the identity.
+    unknown : float
+        Of the motion, that they make of it in other ways.
+    """
+
+    shares: Mapping[str, float]
+    delays: float
+    unknown: float
+
+
+@dataclass(frozen=True, slots=True)
 class _Seen:
     """A signal and its past: along what surfaces explain at most, and all else of it."""
 
@@ -58,7 +77,7 @@ class _Seen:
         return _Seen(self.along + factor * other.along, self.rest + factor * other.rest)
 
 
-class _Test:
+class DrivenTest:
     """An identity before its instruments: rate, parts and errors of right sensors."""
 
     def __init__(self, law: Identity) -> None:
@@ -80,7 +99,23 @@ class _Test:
 
         A part that counts `factor` times has no scale beside it.
         """
-        left, errors = self.rate, [*self._errors, *self.delayed.values()]
+        shares = {name: SENSOR_SHARE for name in self.parts if name != scaled}
+        shares |= {} if scaled else {"": SENSOR_SHARE}
+        off, covariance = self._explained(
+            scaled, factor, SensorTolerances(shares, 1.0, UNKNOWN_SHARE)
+        )
+        return float(off @ np.linalg.solve(covariance, off))
+
+    def deviance(self, scaled: str, factor: float, within: SensorTolerances) -> float:
+        """Return minus twice the logarithm of the likelihood of a factor, but for a constant."""
+        off, covariance = self._explained(scaled, factor, within)
+        return float(off @ np.linalg.solve(covariance, off) + np.linalg.slogdet(covariance)[1])
+
+    def _explained(
+        self, scaled: str, factor: float, within: SensorTolerances
+    ) -> tuple[Array, Array]:
+        """Return what surfaces explain of the identity, (instruments,), and its covariance."""
+        left = self.rate
         for part in self.parts.values():
             left = left.plus(-1.0, part)
         if scaled:
@@ -89,16 +124,16 @@ class _Test:
         weights = np.concatenate([[1.0], -beta])
         free = len(left.rest) - len(beta) - self._own.shape[1] - self.instruments
         variance = float(np.sum((left.rest @ weights) ** 2)) / free
-        variance += UNKNOWN_SHARE**2 * float(np.mean((self.rate.along @ weights) ** 2))
+        variance += within.unknown**2 * float(np.mean((self.rate.along @ weights) ** 2))
         covariance = variance * np.eye(len(left.along))
-        scales = [part for name, part in self.parts.items() if name != scaled]
-        scales += [] if scaled else [self.rate]
-        for share, group in ((SENSOR_SHARE, scales), (1.0, errors)):
-            for one in group:
-                error = share * (one.along @ weights)
-                covariance += np.outer(error, error)
-        off = left.along @ weights
-        return float(off @ np.linalg.solve(covariance, off))
+        signals = self.parts | {"": self.rate}
+        errors = [(share, signals[name]) for name, share in within.shares.items()]
+        errors += [(1.0, one) for one in self._errors]
+        errors += [(within.delays, one) for one in self.delayed.values()]
+        for size, one in errors:
+            error = size * (one.along @ weights)
+            covariance += np.outer(error, error)
+        return left.along @ weights, covariance
 
     def _seen(self, values: Array) -> _Seen:
         back = np.lib.stride_tricks.sliding_window_view(values, PAST_STEPS + 1)[:, ::-1]
@@ -109,14 +144,14 @@ class _Test:
 
 def driven_misfit(law: Identity) -> float | None:
     """Return how many deviations squared surfaces break an identity; None where none moved."""
-    return _Test(law).misfit() if _testable(law) else None
+    return DrivenTest(law).misfit() if testable(law) else None
 
 
 def driven_factors(law: Identity) -> Iterator[DrivenFactor]:
     """Return the factors that must be another than one, of those that explain the motion best."""
-    if not (law.driven and _testable(law)):
+    if not (law.driven and testable(law)):
         return
-    test = _Test(law)
+    test = DrivenTest(law)
     least = test.misfit()
     if least < chdtri(
         test.instruments, CERTAIN_P
@@ -143,7 +178,7 @@ def shared_factor(shares: Sequence[tuple[Identity, str]], tried: Iterable[float]
     tried : iterable of float
         Factors that it may be.
     """
-    tests = [(_Test(law), name) for law, name in shares if law.driven and _testable(law)]
+    tests = [(DrivenTest(law), name) for law, name in shares if law.driven and testable(law)]
     whole = sum(test.misfit() for test, _ in tests)
     if whole < CERTAIN:
         return None
@@ -160,7 +195,7 @@ def likelier_factor(
     No proof: the likeliest of those tried, None where all explain less of what surfaces drive. The
     arguments are those of `shared_factor`.
     """
-    tests = [(_Test(law), name) for law, name in shares if law.driven and _testable(law)]
+    tests = [(DrivenTest(law), name) for law, name in shares if law.driven and testable(law)]
     if not tests:
         return None
     broken = {f: sum(test.misfit(name, f) for test, name in tests) for f in (1.0, *tried)}
@@ -168,7 +203,8 @@ def likelier_factor(
     return slope if broken[1.0] - broken[slope] > LIKELIER else None
 
 
-def _testable(law: Identity) -> bool:
+def testable(law: Identity) -> bool:
+    """Return whether a record is long enough, and a surface moved, to test an identity."""
     count = PAST_STEPS + 1 + len(law.beside) + len(law.inputs) * len(LAGS_STEPS)
     long = law.step_s * len(law.rate) >= SHORTEST_S
     return long and len(law.inputs) > 0 and len(law.rate) - PAST_STEPS >= ROWS_EACH * count

@@ -45,6 +45,7 @@ UNDRIVEN_EXPLAINED = 0.75  # of a wind angle that no surface drives: of less the
 QUIET_RADPS = 0.02  # noise of a still sensor follows nothing
 BLOCK_S, SLOW_S = 0.1, 0.5  # slopes are those of means over this long; slow: pitot and GPS
 FEWEST = 32  # means
+OVER_AIRSPEED = " over airspeed_mps"  # ends the name of a part that the airspeed divides
 ALONG, ACROSS = ("elevator_rad",), ("aileron_rad", "rudder_rad")  # what drives which
 DRIVING_RAD = 0.05  # a surface that swings less is a hand that answers, not a test input
 # Right sensors: tilt of an IMU, zero of a vane, delay of a pitot, one deviation each; and thrust
@@ -216,8 +217,7 @@ def _judge_driven(f: DrivenFactor) -> Finding:
 
 def _judge_airspeed(laws: Sequence[Identity]) -> list[Finding]:
     """Return the finding of an airspeed whose unit only lift and side force together tell."""
-    slow = " over airspeed_mps"
-    parts = [(law, name) for law in laws for name in law.parts if name.endswith(slow)]
+    parts = [(law, name) for law in laws for name in law.parts if name.endswith(OVER_AIRSPEED)]
     gains = [gain for gain in UNITS["mps"].values() if gain != 1.0]
     times = shared_factor(parts, [*gains, *(1.0 / gain for gain in gains)])
     if times is None:

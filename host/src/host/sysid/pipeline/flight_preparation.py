@@ -25,6 +25,7 @@ from host.sysid.compatibility.reconstruction import (
 from host.sysid.compatibility.sensor_corrections import without_estimated_delays
 from host.sysid.compatibility.servo_response import commands_of, surface_positions
 from host.sysid.flight.agreement_findings import calibration_findings, disagreement
+from host.sysid.flight.airspeed_scale import airspeed_scale_findings
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.feedback_findings import feedback_findings
 from host.sysid.flight.flight_tables import read_flight_columns, source_name
@@ -112,7 +113,6 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         findings += [no_instrument_errors_finding(columns)] if read.shares else []
     reconstructed = agreement is not None and known is not None
     findings += no_vanes_finding(columns, reconstructed=reconstructed)
-    findings = [f.accept() if f.check in how.accept and not f.accepted else f for f in findings]
     flight = reconstruct_flight(
         columns,
         found,
@@ -121,10 +121,11 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         # Without sensor positions a vane ahead of the CG looks like a delayed one.
         compatibility=agreement if known is not None and how.corrections else None,
         instrument=instrument,
-        findings=findings,
         resolution=read.resolution,
         maker=read.recording.maker,
     )
+    if instrument is not None:
+        findings += airspeed_scale_findings(flight.corrected, instrument)
     angles = None
     if agreement is not None and not agreement.vanes and known is not None:
         try:
@@ -132,8 +133,10 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
             notes.append(angles.line())
         except IdentificationError as error:
             notes.append(str(error))
+    findings = [f.accept() if f.check in how.accept and not f.accepted else f for f in findings]
     flight = replace(
         flight,
+        findings=tuple(findings),
         delays_open=flight.delays_open and how.delays,
         commands=commands,
         servo=servo_prior(sensors) if commands and how.delays else None,
