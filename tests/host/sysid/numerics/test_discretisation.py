@@ -7,6 +7,7 @@ import pytest
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import DelayGroup, LinearModel, Parameter, Term
 from host.sysid.numerics.ar_noise import ArNoise, ar_filter, autocovariance
+from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.fractional_delay import delay_columns, slope_by_delay
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.process_noise import discrete_noise
@@ -174,3 +175,14 @@ def test_noise_of_a_model_that_diverges_within_a_sample_says_nothing() -> None:
         warnings.simplefilter("error")
         _, Q = discrete_noise(np.diag([5e4, -5e4]), np.ones(2), 0.02)
     assert not np.isfinite(Q).all()
+
+
+def test_what_a_search_tries_far_away_warns_of_nothing() -> None:
+    """A person saw numpy's warning of a matrix product in the answer to a real record."""
+    index = np.zeros(1, dtype=np.int64)
+    far = np.array([[-1e160, 1e160, 0.0, 0.0], [1e160, -1e160, 1.0, 0.0]])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        E, slopes = discretise(far, 2, 1, False, 0.02, index, index, index, np.ones(1), 1)
+    assert not np.all(np.isfinite(E))
+    assert not np.all(np.isfinite(slopes))

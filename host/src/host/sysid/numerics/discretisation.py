@@ -76,19 +76,19 @@ def discretise(
         norm *= 0.5
         squarings += 1
     scale = 0.5**squarings
-    powers = powers_of(M * scale, TAYLOR_ORDER)
-    E = (TAYLOR @ powers.reshape(len(TAYLOR), -1)).reshape(size, size)
     slopes = np.zeros((n_states, size, n_parameters))
-    if n_parameters:
-        # Rows below the states never depend on a parameter.
-        left = powers[:-1, :n_states, :n_states].reshape(TAYLOR_ORDER, -1)
-        right = powers[:-1].reshape(TAYLOR_ORDER, -1)
-        by_entry = (left.T @ (BOTH_SIDES @ right)).reshape(n_states, n_states, size, size)
-        entry_to_parameter = np.zeros((len(row), n_parameters))
-        entry_to_parameter[np.arange(len(row)), parameter] = gain * (dt_s * scale)
-        slopes = by_entry[:, row, column].transpose(0, 2, 1) @ entry_to_parameter
     # A search may try parameters far away; the caller refuses what is no longer finite.
     with np.errstate(over="ignore", invalid="ignore"):
+        powers = powers_of(M * scale, TAYLOR_ORDER)
+        E = (TAYLOR @ powers.reshape(len(TAYLOR), -1)).reshape(size, size)
+        if n_parameters:
+            # Rows below the states never depend on a parameter.
+            left = powers[:-1, :n_states, :n_states].reshape(TAYLOR_ORDER, -1)
+            right = powers[:-1].reshape(TAYLOR_ORDER, -1)
+            by_entry = (left.T @ (BOTH_SIDES @ right)).reshape(n_states, n_states, size, size)
+            entry_to_parameter = np.zeros((len(row), n_parameters))
+            entry_to_parameter[np.arange(len(row)), parameter] = gain * (dt_s * scale)
+            slopes = by_entry[:, row, column].transpose(0, 2, 1) @ entry_to_parameter
         for _ in range(squarings):
             if n_parameters:
                 above = E[:n_states, :n_states] @ slopes.reshape(n_states, -1)
