@@ -96,7 +96,7 @@ def test_a_bank_loop_whose_command_jumps_is_named_and_takes_nothing(seed: int) -
     assert found.text.startswith("aileron_rad follows phi_rad and p_radps at ")
     assert found.text.endswith(" legs of constant command")
     assert found.feedback is None
-    assert "its derivatives are what their intervals say" in found.done
+    assert "its derivatives are as their intervals say" in found.done
     # The same steps by a pilot, small enough for a flight without a law.
     inputs["aileron_rad"] = 0.1 * steps
     assert found_in(flown("lateral", inputs, None, seed)) == []

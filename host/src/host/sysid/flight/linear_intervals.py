@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
+from host.arrays import Array
 from host.instrument.deviations import airspeed_share
 from host.instrument.instrument_errors import usual_errors
 from host.sysid.aerodynamics.coefficient_table import (
@@ -15,6 +18,7 @@ from host.sysid.aerodynamics.coefficient_table import (
 )
 from host.sysid.aerodynamics.left_out_terms import LEFT_OUT_TERMS
 from host.sysid.aerodynamics.path_thrust import path_thrust
+from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_dynamics import DELAYED_COLUMNS, IMU_DELAY, SERVO_DELAY
 from host.sysid.estimators.coherence_inflation import inflate_by_coherence, widened_to
 from host.sysid.estimators.gust_penetration import with_unknown_roll_lag
@@ -27,8 +31,12 @@ from host.sysid.flight.linear_stages import LinearEstimate, LinearIntervals
 from host.sysid.flight.noise_model_limits import excess_over_noise_model
 from host.sysid.flight.pilot_takeover import taken_over
 from host.sysid.flight.sampling_error import hold_shift
-from host.sysid.flight.surface_motion import motion_shift, surfaces_known
-from host.sysid.flight.systematic_errors import add_systematic_covariance, systematic_error_shifts
+from host.sysid.flight.surface_motion import kink_residuals, motion_shift, surfaces_known
+from host.sysid.flight.systematic_errors import (
+    add_systematic_covariance,
+    systematic_error_shifts,
+    systematic_residuals,
+)
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
@@ -117,23 +125,42 @@ def _coherence(
     pilot who takes over (`pilot_takeover`) seems to drive what gusts leave: a lag of the aileron
     was -3.2 deviations in the mean of 12 right fits in air that rolls, -0.3 in test inputs alone.
     """
-    found = input_coherence(free.problem, free.responses, free.theta)
+    found = _tested(e, free, range(len(at_trim)))
     if not found.suspected:
         return found
     surfaces = e.model.controls()
-    commanded = [
-        maneuver
-        for maneuver, flown, columns in zip(at_trim, e.used, e.cuts, strict=True)
+    chosen = [
+        k
+        for k, (flown, columns) in enumerate(zip(e.used, e.cuts, strict=True))
         if not taken_over(columns, flown.found, surfaces)
     ]
+    commanded = [at_trim[k] for k in chosen]
     samples, every = (sum(m.samples for m in some) for some in (commanded, at_trim))
     if samples < LEAST_COMMANDED * every or len(commanded) == len(at_trim):
         return found
     again = free_responses(e.model, e.estimate, commanded)
     if again is None:
         return found
-    alone = input_coherence(again.problem, again.responses, again.theta)
+    alone = _tested(e, again, chosen)
     return found if alone.suspected else alone
+
+
+def _tested(e: LinearEstimate, free: FreeResponses, chosen: Sequence[int]) -> InputCoherence:
+    """Return the coherence of some maneuvers, beside what their instrument's file leaves open."""
+    used = [e.used[k] for k in chosen]
+    known = [c for c in map(_carriers(e).__getitem__, chosen) if c is not None]
+    beside: list[Array] = []
+    if len(known) == len(used):
+        cuts = [e.cuts[k] for k in chosen]
+        beside = systematic_residuals(free.problem, free.theta, cuts, known, e.trim)
+        if kinks := kink_residuals(free.problem, free.theta, used):
+            beside = [np.dstack(both) for both in zip(beside, kinks, strict=True)]
+    return input_coherence(free.problem, free.responses, free.theta, beside=beside)
+
+
+def _carriers(e: LinearEstimate) -> list[Compatibility | None]:
+    """Return what is known of the sensors of each maneuver."""
+    return [m.flight.compatibility or m.flight.calibration_alone for m in e.used]
 
 
 def _shifts(
@@ -141,7 +168,7 @@ def _shifts(
 ) -> tuple[ShiftedEstimate, ...]:
     """Return the estimate moved by one deviation of every systematic error."""
     shifts: tuple[ShiftedEstimate, ...] = () if e.departure is None else e.departure.remainders
-    carriers = [m.flight.compatibility or m.flight.calibration_alone for m in e.used]
+    carriers = _carriers(e)
     known = [c for c in carriers if c is not None]
     # What a reduced model leaves out would pass for what is open of sensors and surfaces.
     fitted = e.at_trim(e.estimate) if e.template in LEFT_OUT_TERMS else list(e.maneuvers)

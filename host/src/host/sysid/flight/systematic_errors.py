@@ -7,8 +7,8 @@ error or the residuals of output error. No fit is repeated.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,6 +30,8 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, without_outputs
 from host.sysid.models.templates import TEMPLATES, Trim, template
+from host.sysid.numerics.nonlinear_problem import output_problem
+from host.sysid.numerics.output_error_problem import OutputProblem
 
 TRIMMING = ("airspeed_mps", "alpha_rad", "theta_rad", "qbar_pa", "density_kgpm3")
 
@@ -64,34 +66,100 @@ def systematic_error_shifts(
     one_step = one_step_of(result, maneuvers, trim)
     if one_step is None:
         return ()
+    return tuple(
+        ShiftedEstimate(
+            one.error,
+            result.estimate + one_step.change(one.model, one.trim, one.maneuvers).sum(axis=0),
+            *one.gains,
+        )
+        for one in _without_each(result.model, maneuvers, cuts, known, trim)
+    )
+
+
+def systematic_residuals(
+    problem: OutputProblem,
+    theta: Array,
+    cuts: Sequence[Mapping[str, Array]],
+    known: Sequence[Compatibility],
+    trim: Trim,
+) -> list[Array]:
+    """Return what one standard deviation of each uncorrected error does to a free simulation.
+
+    Errors are those of the simulated outputs: a share of the measured ones would have their noise,
+    by which it would be found in them.
+
+    Parameters
+    ----------
+    problem : OutputProblem
+        Of the maneuvers.
+    theta : Array
+    cuts, known, trim
+        As `systematic_error_shifts`.
+
+    Returns
+    -------
+    list of Array, shape (p, samples, errors)
+        Of each maneuver; of an error with which the model diverges, zero.
+    """
+    outputs = problem.outputs(theta)
+    if outputs is None:
+        return []
+    names, model = problem.model.outputs, problem.model
+    noise = [m.outputs - y.T for m, y in zip(problem.maneuvers, outputs, strict=True)]
+    smooth = [replace(m, outputs=y.T) for m, y in zip(problem.maneuvers, outputs, strict=True)]
+    still = [
+        {**cut, **{name: cut[name] - left[:, j] for j, name in enumerate(names)}}
+        for cut, left in zip(cuts, noise, strict=True)
+    ]
+    found: list[list[Array]] = [[] for _ in outputs]
+    for one in _without_each(model, smooth, still, known, trim):
+        other = output_problem(one.model, one.maneuvers)
+        there = other.outputs(theta)
+        for k, changes in enumerate(found):
+            changes.append(0.0 * outputs[k] if there is None else other.residual(k, there[k]))
+    return [
+        np.stack(changes, axis=-1) if changes else np.zeros((*y.shape, 0))
+        for changes, y in zip(found, outputs, strict=True)
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class _WithoutOne:
+    """Model, trim and maneuvers without one standard deviation of an error."""
+
+    error: str
+    gains: tuple[float, float]  # of airspeed and dynamic pressure
+    model: LinearModel
+    trim: Trim
+    maneuvers: Sequence[Maneuver]
+
+
+def _without_each(
+    model: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    cuts: Sequence[Mapping[str, Array]],
+    known: Sequence[Compatibility],
+    trim: Trim,
+) -> Iterator[_WithoutOne]:
+    """Yield the data, and through the trim the model, without each uncorrected error."""
     still = _mean_of(cuts)
     flights = {id(c): (c, cut) for c, cut in zip(reversed(known), reversed(cuts), strict=True)}
     sizes = {key: _open_deviations(*flight) for key, flight in flights.items()}
-    errors = list(dict.fromkeys(e for c in known for e in sizes[id(c)]))
-    fresh = is_template(result.model, trim)
-    steps, gains = [], []
-    for error in errors:
+    fresh = is_template(model, trim)
+    for error in dict.fromkeys(e for c in known for e in sizes[id(c)]):
         other = [
             _without_one(cut, error, sizes[id(c)].get(error, 0.0), c)
             for cut, c in zip(cuts, known, strict=True)
         ]
-        changed = [
-            _changed(result.model, m, c, o) for m, c, o in zip(maneuvers, cuts, other, strict=True)
-        ]
+        changed = [_changed(model, m, c, o) for m, c, o in zip(maneuvers, cuts, other, strict=True)]
         there = _mean_of(other)
-        gains.append(
-            (
-                there[1].airspeed_mps / still[1].airspeed_mps,
-                there[1].qbar_pa / still[1].qbar_pa,
-            )
+        gains = (
+            there[1].airspeed_mps / still[1].airspeed_mps,
+            there[1].qbar_pa / still[1].qbar_pa,
         )
         bent = _bent(trim, still[0], there[0]) if fresh and there[0] != still[0] else trim
-        model = result.model if bent is trim else retrimmed(result.model, bent)
-        steps.append(one_step.change(model, bent, changed).sum(axis=0))
-    return tuple(
-        ShiftedEstimate(error, result.estimate + step, *gain)
-        for error, step, gain in zip(errors, steps, gains, strict=True)
-    )
+        moved = model if bent is trim else retrimmed(model, bent)
+        yield _WithoutOne(error, gains, moved, bent, changed)
 
 
 def _open_deviations(known: Compatibility, columns: Mapping[str, Array]) -> dict[str, float]:
