@@ -20,6 +20,8 @@ from host.sysid.compatibility.reconstruction import (
     reconstruct,
 )
 from host.sysid.flight.agreement_findings import calibration_findings
+from studies.foreign.flight import Air
+from studies.independent import answer_with_file
 
 from tests.host.sysid.recorded import NAME, flown, reconstructed
 
@@ -65,6 +67,13 @@ def test_a_doubted_file_is_named_with_the_errors_it_claims_too_small() -> None:
     (line,) = calibration_lines(found)
     assert "gyro_scale 3.1 times" in line
     assert "vane_scale" not in line
+
+
+@pytest.mark.parametrize("seed", [24320, 24326, 24338])
+def test_without_gps_what_looks_like_a_tilt_of_the_imu_doubts_no_file(seed: int) -> None:
+    """Zero of the vane, 12 mrad by the fit, and a gyro's bias: 3 to 6 times what the file said."""
+    answer = answer_with_file(Air(), seed, "longitudinal")
+    assert "calibration" not in {finding.check for finding in answer.findings}
 
 
 def test_where_no_error_alone_is_too_large_it_may_be_any() -> None:

@@ -66,6 +66,23 @@ def test_a_hidden_lag_is_seen_and_named(colour: str) -> None:
     assert colour == "AR(1) 0.9" or "a lag of elevator_rad" in named
 
 
+@pytest.mark.parametrize(("lag_s", "seen"), [(0.0, False), (0.5, True)])
+def test_an_error_that_is_known_elsewhere_accuses_no_model(lag_s: float, seen: bool) -> None:
+    """A gyro 3 % off by its file: the inputs drive what it leaves, and no model lacks it."""
+    maneuver = record(4, "white", lag_s=lag_s, snr=2000.0)
+    wrong = maneuver.outputs * np.where(np.arange(4) == 2, 1.03, 1.0)
+    problem = OutputProblem(navion_structured(), [replace(maneuver, outputs=wrong)])
+    found = minimise(problem, np.concatenate([navion_structured().start, np.zeros(4)]))
+    allowed = np.zeros((4, maneuver.samples, 1))
+    allowed[2, :, 0] = 0.03 * found.responses[0].y[2]
+    alone = input_coherence(problem, found.responses, found.theta)
+    beside = input_coherence(problem, found.responses, found.theta, beside=[allowed])
+    assert alone.coherent
+    assert bool(beside.coherent) == seen
+    assert beside.information.shape == alone.information.shape
+    assert beside.shift.shape == alone.shift.shape
+
+
 def test_the_noise_beside_the_inputs_is_that_of_a_right_model() -> None:
     """The lag's residual has a memory of its own; white noise beside it stays white."""
     right, wrong = (coherence_of(record(1, "white", lag_s=lag_s)) for lag_s in (0.0, 0.3))
