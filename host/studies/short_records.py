@@ -15,6 +15,7 @@ from functools import cache
 import numpy as np
 from host.arrays import Array
 from host.compiled import prefer_machine_code
+from host.constants import GRAVITY_MPS2
 from host.instrument.recording import FOREIGN
 from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.answer.verdict import verdict_of
@@ -98,15 +99,13 @@ def record(
     u[:, model.inputs.index(surface)] = size_rad * (ramps[0] - 2.0 * ramps[1] + ramps[2])
     vane = model.states.index("beta_rad")
     gust = _gust(rng, len(t), aircraft.airspeed_mps, intensity_mps)
-    by_gust = signal.StateSpace(
-        A, np.column_stack([B, A[:, vane]]), C, np.column_stack([D, C[:, vane]])
-    )
-    _, y, _ = signal.lsim(by_gust, np.column_stack([u, gust]), t)
+    system = (A, np.column_stack([B, A[:, vane]]), C, np.column_stack([D, C[:, vane]]))
+    y = np.real(signal.lsim(system, np.column_stack([u, gust]), t)[1])
     still = np.zeros(len(t))
     columns = {
         "t_s": t, "airspeed_mps": still + aircraft.airspeed_mps, "q_radps": still,
         "alpha_rad": still + 0.06, "theta_rad": still + 0.06, "ax_mps2": still + 0.6,
-        "az_mps2": still - 9.8,
+        "az_mps2": still - GRAVITY_MPS2,
     }  # fmt: skip
     for k, name in enumerate(model.outputs):
         columns[name] = y[:, k] + NOISE_SD[name] * rng.standard_normal(len(t))

@@ -90,9 +90,7 @@ def _finding(
     said = f"{surface} {law_words(law)}{jumps}"
     causes = CAUSES.get(surface, CAUSES[""])
     if aerodynamic is None:
-        done = (
-            "no force depends on attitude or height: its derivatives are what their intervals say"
-        )
+        done = "no force depends on attitude or height: its derivatives are as their intervals say"
         return Finding("feedback", (), said, causes, done)
     letter, own = MOMENT[surface], LABEL[surface]
     alike = [f"{letter}_{LABEL[n]}" for n in (surface, *aerodynamic.signals)]
