@@ -36,6 +36,9 @@ class LeftOutTerm:
         One deviation, over the derivative that it is compared with.
     mean : float
         What is usual, over that derivative.
+    attenuated : bool
+        Its column is nearly made of the states: what is left of it to tell the term is no larger
+        than its noise, which makes the term small. Its deviation stands whatever the data say.
     """
 
     name: str
@@ -44,6 +47,7 @@ class LeftOutTerm:
     like: str
     share: float
     mean: float = 0.0
+    attenuated: bool = False
 
 
 GRAVITY = LeftOutTerm("G_phi", "beta_rad", "phi_rad", "", 0.4, 0.5)  # g/V, of 10 m/s on
@@ -51,7 +55,7 @@ GRAVITY = LeftOutTerm("G_phi", "beta_rad", "phi_rad", "", 0.4, 0.5)  # g/V, of 1
 # dihedral turns a small aircraft at up to three times a second of its roll damping.
 LEFT_OUT_TERMS: dict[str, tuple[LeftOutTerm, ...]] = {
     "dutch-roll": (
-        LeftOutTerm("N_p", "r_radps", "p_radps", "N_r", 0.5, 0.4),
+        LeftOutTerm("N_p", "r_radps", "p_radps", "N_r", 0.5, 0.4, attenuated=True),
         LeftOutTerm("N_da", "r_radps", "aileron_rad", "N_dr", 0.5),
         LeftOutTerm("Y_p", "beta_rad", "p_radps", "Y_beta", 0.1),
         LeftOutTerm("Y_r", "beta_rad", "r_radps", "Y_beta", 0.1),
