@@ -99,7 +99,7 @@ def systematic_residuals(
     Returns
     -------
     list of Array, shape (p, samples, errors)
-        Of each maneuver; of an error with which the model diverges, zero.
+        Of each maneuver; those that change nothing, or with which the model diverges, are left out.
     """
     outputs = problem.outputs(theta)
     if outputs is None:
@@ -117,8 +117,9 @@ def systematic_residuals(
         there = other.outputs(theta)
         for k, changes in enumerate(found):
             changes.append(0.0 * outputs[k] if there is None else other.residual(k, there[k]))
+    moving = [k for k, changes in enumerate(zip(*found, strict=True)) if np.any(np.hstack(changes))]
     return [
-        np.stack(changes, axis=-1) if changes else np.zeros((*y.shape, 0))
+        np.stack([changes[k] for k in moving], axis=-1) if moving else np.zeros((*y.shape, 0))
         for changes, y in zip(found, outputs, strict=True)
     ]
 
