@@ -45,6 +45,7 @@ ROUNDS_WITHOUT, ROUNDS_BESIDE = 2, 3  # of the noise models: first without the a
 # gusts beside a sensor's white noise.
 BLOCK_S = 0.05
 FEWEST_FREEDOM = 30.0  # of the noise along a column, for a test
+SHOWS = 0.1  # of the power of noise: a known error with less takes nothing of the residual
 RANK = 1e-9  # of the largest eigenvalue of the scaled columns: less is rounding
 
 
@@ -201,6 +202,7 @@ def input_coherence(
     """
     data = _data(problem, responses, block_s, beside)
     count = len(problem.names)
+    data = _with_what_shows(data, count, problem.least_variance)
     own_prior, known = problem.prior_precision, data[0].slopes[0].shape[1] - count
     prior = np.concatenate([own_prior, np.ones(known)])
     pulled = np.concatenate([own_prior * (problem.prior_mean - theta), np.zeros(known)])
@@ -298,6 +300,16 @@ def _data(
             extra.append(block_means(added[number], block, seen))
         found.append(_Data(residuals, slopes, extra))
     return found
+
+
+def _with_what_shows(data: list[_Data], count: int, least_variance: Array) -> list[_Data]:
+    """Return the data without the known errors behind the first columns that no output shows."""
+    power = np.zeros(data[0].slopes[0].shape[1])
+    for d, least in zip(data, least_variance, strict=True):
+        variance = max(float(np.mean(np.concatenate(d.residuals) ** 2)), float(least))
+        power += np.sum([np.sum(J * J, axis=0) for J in d.slopes], axis=0) / variance
+    kept = np.append(np.ones(count, dtype=bool), power[count:] > SHOWS)
+    return [_Data(d.residuals, [J[:, kept] for J in d.slopes], d.added) for d in data]
 
 
 def block_length(dt_s: float, block_s: float = BLOCK_S) -> int:
