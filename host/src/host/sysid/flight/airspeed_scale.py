@@ -47,11 +47,14 @@ class AirspeedScale:
     ----------
     factor : float
         The likeliest.
+    claimed : float
+        One deviation of it from one, by the file.
     excess : float
         Deviations squared by which the likeliest within the file's tolerance is worse.
     """
 
     factor: float
+    claimed: float
     excess: float
 
 
@@ -72,14 +75,14 @@ def airspeed_scale_findings(
     found = airspeed_scale(columns, instrument)
     if found is None or found.excess < CERTAIN:
         return []
-    off, claimed = found.factor - 1.0, _claimed(columns, instrument)
+    off = found.factor - 1.0
     return [
         Finding(
             CHECK,
             tuple(k for k in ("airspeed_mps", "qbar_pa") if k in columns),
             f"airspeed_mps reads about {100.0 * abs(off):.0f} % {'high' if off > 0.0 else 'low'},"
             " by how forces turn the wind angles where surfaces drive them; its file allows"
-            f" {100.0 * claimed:.1f} % (one deviation)",
+            f" {100.0 * found.claimed:.1f} % (one deviation)",
             ("a pitot that is not the calibrated one", "scales of vanes or accelerometers"),
         )
     ]
@@ -105,14 +108,13 @@ def airspeed_scale(
     if not tests:
         return None
     own = np.array([sum(t.deviance(part, f, within) for t, part, within in tests) for f in TRIED])
-    beside = own + ((TRIED - 1.0) / _claimed(columns, instrument)) ** 2
-    (factor, least), (_, claimed) = _least(own), _least(beside)
-    return AirspeedScale(factor, max(claimed - least, 0.0))
+    claimed = _claimed(flown, instrument)
+    (factor, least), (_, within) = _least(own), _least(own + ((TRIED - 1.0) / claimed) ** 2)
+    return AirspeedScale(factor, claimed, max(within - least, 0.0))
 
 
-def _claimed(columns: Mapping[str, Array], instrument: SensorErrorModel) -> float:
-    """Return one deviation of the airspeed's scale by the file."""
-    flown, _ = airborne(columns)
+def _claimed(flown: Mapping[str, Array], instrument: SensorErrorModel) -> float:
+    """Return one deviation of the airspeed's scale by the file, in flight."""
     density = flown.get("density_kgpm3", np.array([STANDARD_DENSITY_KGPM3]))
     qbar_pa = 0.5 * float(np.median(density)) * float(np.median(flown["airspeed_mps"])) ** 2
     return airspeed_share(instrument.errors, qbar_pa)
