@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,8 +35,10 @@ FEEDBACK_R2 = 0.9  # R2 from which an input is a function of the signals
 BETTER = 0.6  # of what later signals leave unexplained: earlier ones must leave no more
 LEAST_DECAY = 1e-3  # of a filter's state at the start of a record
 RIDGE = 1e-10  # of a signal's power
+WHOLE = 1e-9  # of a sample: less is rounding
 Shape = tuple[float, float]  # lag and wash-out, s
 NO_FILTER: Shape = (0.0, np.inf)
+SHAPES: tuple[Shape, ...] = tuple((lag, wash) for lag in LAGS_S for wash in WASHOUTS_S)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,14 +101,23 @@ def feedback_law(
     everything = tuple(range(len(signals)))
     if np.max(_r2(record.products(NO_FILTER, steps), everything)) < HOPELESS:
         return None
-    shapes = [(lag, wash) for lag in LAGS_S for wash in WASHOUTS_S]
-    before = _simplest(record, dict.fromkeys(shapes, steps), FEEDBACK_R2)
+    before = _simplest(record, dict.fromkeys(SHAPES, steps), FEEDBACK_R2)
     if before.r2 < FEEDBACK_R2:
         return None
-    after = _simplest(record, {shape: -shape[0] - steps[RESPONSE_STEPS:] for shape in shapes})
+    after = _simplest(record, {shape: -shape[0] - steps[RESPONSE_STEPS:] for shape in SHAPES})
     if 1.0 - before.r2 > BETTER * (1.0 - after.r2):
         return None
     return _refined(record, before, tuple(signals))
+
+
+class _Grid(NamedTuple):
+    """Delays of each filter, and products of the input and all signals behind them.
+
+    Those are of shape (filters, delays, 1 + signals, 1 + signals).
+    """
+
+    delays_s: Mapping[Shape, Array]
+    products: Array
 
 
 class _Record:
@@ -118,7 +130,7 @@ class _Record:
         kept = [np.asarray(w)[::stride] for w in windows if len(w)]
         self.dt_s = dt_s
         self.values = values - values[0]
-        self._lagged = (0.0, self.values)  # of the lag asked for last
+        self._behind: dict[Shape, Array] = {}  # the signals, of single filters of the grid
         self.rows: IntArray = np.concatenate(kept) if kept else np.zeros(0, dtype=np.int64)
         self.sizes = np.array([len(w) for w in kept])
         self.target = self._centred(moved[self.rows][None, :, None])[0, :, 0]
@@ -133,26 +145,40 @@ class _Record:
 
     def products(self, shape: Shape, delays: Array) -> Array:
         """Return products of the input and all signals, (delays, 1 + signals, 1 + signals)."""
-        lag_s, washout_s = shape
-        if self._lagged[0] != lag_s:
-            self._lagged = (lag_s, self._filtered(self.values, lag_s, np.inf))
-        values = self._filtered(self._lagged[1], 0.0, washout_s)
-        whole = np.floor(delays / self.dt_s + 1e-9).astype(np.int64)
+        values = self._of_grid(shape) if shape in SHAPES else self._filtered(shape)
+        whole = np.floor(delays / self.dt_s + WHOLE).astype(np.int64)
         part = (delays / self.dt_s - whole)[:, None, None]
         at = self.rows[None, :] - whole[:, None]
         last = len(values) - 1
-        late = (1.0 - part) * values[np.clip(at, 0, last)]
-        late += part * values[np.clip(at - 1, 0, last)]
+        late = values[np.clip(at, 0, last)]
+        if np.max(np.abs(part)) > WHOLE:
+            late = (1.0 - part) * late + part * values[np.clip(at - 1, 0, last)]
         target = np.broadcast_to(self.target[None, :, None], (*late.shape[:2], 1))
         both = np.concatenate([target, self._centred(late)], axis=2)
         for decay in self._free_decays(shape):
             both -= decay[:, None] * (decay @ both)[:, None, :]
         return np.asarray(both.transpose(0, 2, 1) @ both)
 
-    def _filtered(self, values: Array, lag_s: float, washout_s: float) -> Array:
-        for b, a in _sections(lag_s, washout_s, self.dt_s):
+    def _filtered(self, shape: Shape) -> Array:
+        values: Array = self.values
+        for b, a in _sections(*shape, self.dt_s):
             values = first_order_filter(b, a, values)
         return values
+
+    def _of_grid(self, shape: Shape) -> Array:
+        """Return the same of a filter of the grid, of whose parts each is run once.
+
+        In partial fractions a lag and a wash-out behind each other are b g / (1 - b - g) times the
+        signal less what either makes of it; b and g are their first coefficients.
+        """
+        lag_s, washout_s = shape
+        if lag_s > 0.0 and washout_s < np.inf:
+            b, g = (numerator[0] for numerator, _ in _sections(*shape, self.dt_s))
+            either = self._of_grid((lag_s, np.inf)) + self._of_grid((0.0, washout_s))
+            return np.asarray((self.values - either) * (b * g / (1.0 - b - g)))
+        if shape not in self._behind:
+            self._behind[shape] = self._filtered(shape)
+        return self._behind[shape]
 
     def _free_decays(self, shape: Shape) -> list[Array]:
         """Return an orthonormal basis of the responses to a filter's unknown initial state."""
@@ -174,48 +200,44 @@ def _simplest(record: _Record, delays_s: Mapping[Shape, Array], least_r2: float 
 
     One signal after the other is added while it is worth it. A law of several may need them all at
     once (heading, bank and roll rate of an autopilot): where all together explain far more, those
-    that are not worth it are left out one by one.
+    that are not worth it are left out one by one. Of every filter as many delays are tried.
     """
-    products = {shape: record.products(shape, own) for shape, own in delays_s.items()}
+    grid = _Grid(delays_s, np.stack([record.products(*item) for item in delays_s.items()]))
     best = _Found()
     count = record.values.shape[1]
-    if max(float(np.max(_r2(p, range(count)))) for p in products.values()) < least_r2:
+    if float(np.max(_r2(grid.products, range(count)))) < least_r2:
         return best
     while len(best.signals) < min(MOST_SIGNALS, count):
         rest = [k for k in range(count) if k not in best.signals]
-        tried = [_best(products, delays_s, (*best.signals, k)) for k in rest]
+        tried = [_best(grid, (*best.signals, k)) for k in rest]
         found = max(tried, key=lambda f: f.r2)
         if 1.0 - found.r2 > WORTH * (1.0 - best.r2):
             break
         best = found
-    fewer = _eliminated(products, delays_s, tuple(range(count)))
+    fewer = _eliminated(grid, tuple(range(count)))
     return fewer if 1.0 - fewer.r2 < TOGETHER_WORTH * (1.0 - best.r2) else best
 
 
-def _eliminated(
-    products: Mapping[Shape, Array], delays_s: Mapping[Shape, Array], columns: tuple[int, ...]
-) -> _Found:
+def _eliminated(grid: _Grid, columns: tuple[int, ...]) -> _Found:
     """Return what is left of some signals by backward elimination."""
-    best = _best(products, delays_s, columns)
+    best = _best(grid, columns)
     while len(best.signals) > 1:
         left = (tuple(c for c in best.signals if c != k) for k in best.signals)
-        found = max((_best(products, delays_s, some) for some in left), key=lambda f: f.r2)
+        found = max((_best(grid, some) for some in left), key=lambda f: f.r2)
         if len(best.signals) <= MOST_SIGNALS and 1.0 - best.r2 < WORTH * (1.0 - found.r2):
             break
         best = found
     return best
 
 
-def _best(
-    products: Mapping[Shape, Array], delays_s: Mapping[Shape, Array], columns: tuple[int, ...]
-) -> _Found:
+def _best(grid: _Grid, columns: tuple[int, ...]) -> _Found:
     """Return filter and delay of some signals: no filter where none is worth it."""
     best = _Found()
-    for shape, grams in products.items():
-        r2 = _r2(grams, columns)
+    every = _r2(grid.products, columns)
+    for (shape, delays), r2 in zip(grid.delays_s.items(), every, strict=True):
         k = int(np.argmax(r2))
         if not best.signals or 1.0 - r2[k] < FILTER_WORTH * (1.0 - best.r2):
-            best = _Found(float(r2[k]), columns, shape, float(delays_s[shape][k]))
+            best = _Found(float(r2[k]), columns, shape, float(delays[k]))
     return best
 
 
@@ -258,15 +280,15 @@ def _refined(record: _Record, found: _Found, names: Sequence[str]) -> FeedbackLa
     )
 
 
-def _r2(grams: Array, columns: Sequence[int]) -> Array:
-    """Return R2 of the input by some signals, at each delay."""
+def _r2(products: Array, columns: Sequence[int]) -> Array:
+    """Return R2 of the input by some signals, of each matrix of products, (...)."""
     at = [1 + k for k in columns]
-    own, cross = grams[:, at][:, :, at], grams[:, at, 0]
-    scale = np.sqrt(np.maximum(np.diagonal(own, axis1=1, axis2=2), 1e-300))
-    own = own / (scale[:, :, None] * scale[:, None, :]) + RIDGE * np.eye(len(at))
+    own, cross = products[..., at, :][..., at], products[..., at, 0]
+    scale = np.sqrt(np.maximum(np.diagonal(own, axis1=-2, axis2=-1), 1e-300))
+    own = own / (scale[..., :, None] * scale[..., None, :]) + RIDGE * np.eye(len(at))
     cross = cross / scale
-    solved = np.linalg.solve(own, cross[:, :, None])[:, :, 0]
-    return np.asarray(np.sum(solved * cross, axis=1) / np.maximum(grams[:, 0, 0], 1e-300))
+    solved = np.linalg.solve(own, cross[..., None])[..., 0]
+    return np.asarray(np.sum(solved * cross, axis=-1) / np.maximum(products[..., 0, 0], 1e-300))
 
 
 def _sections(lag_s: float, washout_s: float, dt_s: float) -> Iterator[tuple[Array, Array]]:
