@@ -5,10 +5,12 @@ Every conversion between the two uses these gains. Etkin & Reid, Dynamics of Fli
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from host.arrays import Array
 
 if TYPE_CHECKING:
     from host.aircraft.mass_properties import AirframeData, Condition
@@ -72,22 +74,49 @@ def dimensional_gains(airframe: AirframeData, condition: Condition) -> dict[str,
     return found
 
 
-def from_dimensional(
-    derivatives: Mapping[str, float], airframe: AirframeData, condition: Condition
-) -> dict[str, float]:
-    """Return coefficients from dimensional derivatives: the inverse of `dimensional_gains`.
+def coefficient_slopes(
+    derivatives: Sequence[str], airframe: AirframeData, condition: Condition
+) -> tuple[list[str], Array]:
+    """Return which coefficients go with some dimensional derivatives, and in what proportion.
 
-    A rolling moment without its yawing moment, or the reverse, is solved with zero for the absent
-    one. Names that are no derivative are left out.
+    The inverse of `dimensional_gains`. A rolling moment without its yawing moment, or the reverse,
+    is solved with zero for the absent one. Names that are no derivative have no part in any.
+
+    Parameters
+    ----------
+    derivatives : sequence of str
+    airframe : AirframeData
+        Mass, inertia, reference sizes.
+    condition : Condition
+        Airspeed and dynamic pressure.
+
+    Returns
+    -------
+    list of str
+    Array, shape (coefficients, derivatives)
     """
     gains = dimensional_gains(airframe, condition)
-    found = {}
+    place = {name: k for k, name in enumerate(derivatives)}
+    names, slopes = [], []
     for name in gains:
-        if name not in derivatives:
+        if name not in place:
             continue
         row, _, label = name.partition("_")
         coupled = [f"{d}_{label}" for d in (MOMENTS if row in MOMENTS else (row,))]
-        matrix = [[gains[d][coefficient_name(c)] for c in coupled] for d in coupled]
-        solved = np.linalg.solve(matrix, [derivatives.get(d, 0.0) for d in coupled])
-        found[coefficient_name(name)] = float(solved[coupled.index(name)])
-    return found
+        inverse = np.linalg.inv([[gains[d][coefficient_name(c)] for c in coupled] for d in coupled])
+        own = np.zeros(len(derivatives))
+        for d, slope in zip(coupled, inverse[coupled.index(name)], strict=True):
+            if d in place:
+                own[place[d]] = slope
+        names.append(coefficient_name(name))
+        slopes.append(own)
+    return names, np.array(slopes).reshape(len(names), len(derivatives))
+
+
+def from_dimensional(
+    derivatives: Mapping[str, float], airframe: AirframeData, condition: Condition
+) -> dict[str, float]:
+    """Return coefficients from dimensional derivatives, by `coefficient_slopes`."""
+    names, slopes = coefficient_slopes(list(derivatives), airframe, condition)
+    values = slopes @ np.array(list(derivatives.values()))
+    return dict(zip(names, values.tolist(), strict=True))

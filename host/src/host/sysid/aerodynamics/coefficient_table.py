@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from host.aircraft.gains import dimensional_name, from_dimensional
+from host.aircraft.gains import coefficient_slopes, dimensional_name
 from host.aircraft.mass_properties import AirframeData, Condition
 from host.arrays import Array
 from host.constants import NORMAL_95
@@ -111,28 +111,19 @@ def coefficient_parts(
         Of the maneuvers, which is in the derivatives; none without.
     """
     path_thrust = thrust or PathThrust(0.0, 0.0)
-
-    def in_proportion(derivatives: Array, a: AirframeData, at: Condition) -> Array:
-        table = from_dimensional(dict(zip(result.names, derivatives.tolist(), strict=True)), a, at)
-        return np.array([table[name] for name in names])
+    # Coefficients go with derivatives in proportion.
+    names, slopes = coefficient_slopes(result.names, airframe, condition)
 
     def converted(
         derivatives: Array, a: AirframeData, at: Condition, path_thrust: PathThrust = path_thrust
     ) -> Array:
         by_thrust = path_thrust.in_derivatives(a.mass_kg, at.airspeed_mps)
         of_thrust = np.array([by_thrust.get(name, 0.0) for name in result.names])
-        return in_proportion(derivatives - of_thrust, a, at)
+        here = a is airframe and at == condition
+        by_derivative = slopes if here else coefficient_slopes(result.names, a, at)[1]
+        return np.asarray(by_derivative @ (derivatives - of_thrust))
 
-    names = list(
-        from_dimensional(
-            dict(zip(result.names, result.estimate.tolist(), strict=True)), airframe, condition
-        )
-    )
     value = converted(result.estimate, airframe, condition)
-    # Coefficients go with derivatives in proportion.
-    slopes = np.stack(
-        [in_proportion(row, airframe, condition) for row in np.eye(len(result.names))], axis=1
-    )
     assumed: dict[str, Array] = {
         cause: (converted(result.estimate, a, at) - value) / PERTURBATION * share
         for cause, (share, a, at) in _perturbed_mass_properties(airframe, condition).items()
