@@ -115,7 +115,9 @@ def correct_columns(
         (RATES, "gyro_bias_{}_radps", "gyro_scale_{}"),
         (FORCES, "accel_bias_{}_mps2", "accel_scale_{}"),
     ):
-        if not all(name in columns for name in names):
+        own = [pattern.format(a) for pattern in (offset, gain) for a in "xyz"]
+        unmoved = not (tilt.any() or any(at(name) for name in own))
+        if unmoved or not all(name in columns for name in names):
             continue
         corrected = np.stack(
             [
@@ -125,8 +127,8 @@ def correct_columns(
         )
         result |= zip(names, corrected + np.cross(tilt, corrected, axisb=0, axisc=0), strict=True)
     for name in ("alpha", "beta"):
-        if f"{name}_rad" in columns:
-            zero, scale = at(f"{name}_zero_rad", 0.0), at(f"{name}_scale", 0.0)
+        zero, scale = at(f"{name}_zero_rad", 0.0), at(f"{name}_scale", 0.0)
+        if f"{name}_rad" in columns and (zero or scale):
             result[f"{name}_rad"] = (columns[f"{name}_rad"] - zero) / (1.0 + scale)
     return result | _correct_pitot(columns, errors, part)
 

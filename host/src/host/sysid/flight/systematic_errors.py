@@ -7,6 +7,7 @@ error or the residuals of output error. No fit is repeated.
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -66,14 +67,14 @@ def systematic_error_shifts(
     one_step = one_step_of(result, maneuvers, trim)
     if one_step is None:
         return ()
-    return tuple(
-        ShiftedEstimate(
-            one.error,
-            result.estimate + one_step.change(one.model, one.trim, one.maneuvers).sum(axis=0),
-            *one.gains,
-        )
-        for one in _without_each(result.model, maneuvers, cuts, known, trim)
-    )
+    shifted = []
+    for one in _without_each(result.model, maneuvers, cuts, known, trim):
+        estimate = result.estimate
+        if not one.same(result.model, maneuvers):
+            change = one_step.change(one.model, one.trim, one.maneuvers)
+            estimate = estimate + change.sum(axis=0)
+        shifted.append(ShiftedEstimate(one.error, estimate, *one.gains))
+    return tuple(shifted)
 
 
 def systematic_residuals(
@@ -113,8 +114,10 @@ def systematic_residuals(
     ]
     found: list[list[Array]] = [[] for _ in outputs]
     for one in _without_each(model, smooth, still, known, trim):
+        if one.same(model, smooth):
+            continue
         other = output_problem(one.model, one.maneuvers)
-        there = other.outputs(theta)
+        there = outputs if one.simulates_the_same(model, smooth) else other.outputs(theta)
         for k, changes in enumerate(found):
             changes.append(0.0 * outputs[k] if there is None else other.residual(k, there[k]))
     moving = [k for k, changes in enumerate(zip(*found, strict=True)) if np.any(np.hstack(changes))]
@@ -133,6 +136,17 @@ class _WithoutOne:
     model: LinearModel
     trim: Trim
     maneuvers: Sequence[Maneuver]
+
+    def same(self, model: LinearModel, maneuvers: Sequence[Maneuver]) -> bool:
+        """Return whether the error changes neither the model nor any of the maneuvers."""
+        return self.model is model and all(map(operator.is_, self.maneuvers, maneuvers))
+
+    def simulates_the_same(self, model: LinearModel, maneuvers: Sequence[Maneuver]) -> bool:
+        """Return whether it changes nothing but what was measured."""
+        return self.model is model and all(
+            own.inputs is m.inputs and own.dt_s == m.dt_s
+            for own, m in zip(self.maneuvers, maneuvers, strict=True)
+        )
 
 
 def _without_each(
@@ -213,21 +227,20 @@ def _bent(trim: Trim, still: Trim, there: Trim) -> Trim:
 def _changed(
     model: LinearModel, maneuver: Maneuver, still: Mapping[str, Array], other: Mapping[str, Array]
 ) -> Maneuver:
-    """Return a maneuver with the difference of two sets of columns added."""
+    """Return a maneuver with the difference of two sets of columns added; itself without any."""
 
     def moved(names: Sequence[str], values: Array) -> Array:
-        if all(other[n] is still[n] for n in names):
+        if all(other[n] is still[n] or np.array_equal(other[n], still[n]) for n in names):
             return values
         return values + np.column_stack([other[n] - still[n] for n in names])
 
     same = other.get("t_s") is still.get("t_s")
     longer = 1.0 if same else float(np.ptp(other["t_s"]) / np.ptp(still["t_s"]))
-    return replace(
-        maneuver,
-        dt_s=maneuver.dt_s * longer,
-        inputs=moved(model.inputs, maneuver.inputs),
-        outputs=moved(model.outputs, maneuver.outputs),
-    )
+    inputs = moved(model.inputs, maneuver.inputs)
+    outputs = moved(model.outputs, maneuver.outputs)
+    if same and inputs is maneuver.inputs and outputs is maneuver.outputs:
+        return maneuver
+    return replace(maneuver, dt_s=maneuver.dt_s * longer, inputs=inputs, outputs=outputs)
 
 
 def is_template(model: LinearModel, trim: Trim) -> bool:
