@@ -70,6 +70,17 @@ def test_what_a_file_leaves_open_is_no_finding(claimed: SensorErrorModel) -> Non
     assert airspeed_scale_findings(columns, wide) == []
 
 
+def test_a_scale_of_the_accelerometers_that_a_file_leaves_open_is_none(
+    claimed: SensorErrorModel,
+) -> None:
+    """Forces that read 12 % low look like an airspeed that reads high."""
+    right = measured(CALM, SEED, 1.0)
+    low = {k: 0.88 * v if k in ("ay_mps2", "az_mps2") else v for k, v in right.items()}
+    assert len(airspeed_scale_findings(low, claimed)) == 1
+    wide = claimed.scaled(25.0, "accel_scale")
+    assert airspeed_scale_findings(low, wide) == []
+
+
 def test_without_surfaces_nothing_tells_it(claimed: SensorErrorModel) -> None:
     columns = measured(CALM, SEED, 1.1)
     still = {k: 0.0 * v if k.endswith(("or_rad", "on_rad", "er_rad")) else v

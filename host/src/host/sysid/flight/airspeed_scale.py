@@ -123,10 +123,13 @@ def _claimed(flown: Mapping[str, Array], instrument: SensorErrorModel) -> float:
 def _tolerances(law: Identity, slow: str, instrument: SensorErrorModel) -> SensorTolerances:
     """Return what the file claims of all else in an identity."""
     errors = instrument.errors
-    vanes = ("alpha_a", "alpha_b") if law.name == "alpha_rad" else ("beta_a", "beta_b")
+    pitching = law.name == "alpha_rad"
+    vanes = ("alpha_a", "alpha_b") if pitching else ("beta_a", "beta_b")
     rates = {part: errors["gyro_scale"].sigma("y") for part in law.parts if part != slow}
+    force = errors["accel_scale"].sigma("z" if pitching else "y")
     vane = float(np.hypot(errors["vane_scale"].of_mean(*vanes), VANE_MODEL_SHARE))
-    return SensorTolerances({**rates, "": vane}, DELAY_S / SENSOR_DELAY_S, UNKNOWN_SHARE)
+    shares = {**rates, slow: force, "": vane}
+    return SensorTolerances(shares, DELAY_S / SENSOR_DELAY_S, UNKNOWN_SHARE)
 
 
 def _least(values: Sequence[float] | Array) -> tuple[float, float]:
