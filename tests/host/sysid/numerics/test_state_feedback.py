@@ -1,7 +1,9 @@
 """What an input follows is found where no signal tells it alone."""
 
 import numpy as np
+import pytest
 from host.sysid.numerics.state_feedback import feedback_law
+from scipy import signal
 
 DT_S, SAMPLES = 0.02, 1500
 
@@ -19,3 +21,24 @@ def test_signals_that_only_tell_together_are_found() -> None:
     gains = dict(zip(law.signals, law.gains, strict=True))
     np.testing.assert_allclose([gains["both"], gains["slow"]], [0.5, -0.5], rtol=1e-3)
     assert law.r2 > 0.999
+
+
+@pytest.mark.parametrize(("lag_s", "washout_s"), [(0.3, 2.0), (0.2, 1.4)])
+@pytest.mark.parametrize("dt_s", [0.01, 0.02, 0.03])
+def test_a_lag_and_a_wash_out_behind_each_other_are_found(
+    dt_s: float, lag_s: float, washout_s: float
+) -> None:
+    """A yaw damper with both, as scipy filters it; the first pair is one of the grid."""
+    rng = np.random.default_rng(17001)
+    count = round(30.0 / dt_s)
+    q = signal.lfilter([1.0], [1.0, -np.exp(-dt_s / 0.3)], rng.standard_normal(count))
+    law_of_s = [washout_s, 0.0], np.polymul([lag_s, 1.0], [washout_s, 1.0])
+    numerator, denominator = signal.bilinear(*law_of_s, fs=1.0 / dt_s)
+    late = round(0.06 / dt_s)
+    u = 0.7 * np.concatenate([np.zeros(late), signal.lfilter(numerator, denominator, q)[:-late]])
+    other = rng.standard_normal(count)
+    law = feedback_law(dt_s, u, {"other": other, "q": q}, [np.arange(count)])
+    assert law is not None
+    assert law.signals == ("q",)
+    found = (law.gains[0], law.delay_s, law.lag_s, law.washout_s)
+    np.testing.assert_allclose(found, (0.7, 0.06, lag_s, washout_s), rtol=0.02)
