@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from host.sysid.models.state_space_model import LinearModel, Term
 from host.sysid.models.templates import Trim
 
 # In place of an airspeed that nobody measured: gravity is then a term of its own.
@@ -39,6 +40,8 @@ class LeftOutTerm:
     attenuated : bool
         Its column is nearly made of the states: what is left of it to tell the term is no larger
         than its noise, which makes the term small. Its deviation stands whatever the data say.
+    gain : float
+        Of its column: the term is per 1 over it.
     """
 
     name: str
@@ -48,6 +51,7 @@ class LeftOutTerm:
     share: float
     mean: float = 0.0
     attenuated: bool = False
+    gain: float = 1.0
 
 
 GRAVITY = LeftOutTerm("G_phi", "beta_rad", "phi_rad", "", 0.4, 0.5)  # g/V, of 10 m/s on
@@ -101,4 +105,36 @@ def expected_left_out(
     for term in terms:
         value, deviation = like.get(term.like, (1.0, 0.0))
         found[term.name] = (term.mean * value, term.share * float(np.hypot(value, deviation)))
+    return found
+
+
+def acting_terms(
+    model: LinearModel, trim: Trim, name: str, row: str, column: int, gain: float = 1.0
+) -> list[Term]:
+    """Return the entries of a derivative of an input: accelerometers measure a force too.
+
+    Parameters
+    ----------
+    model : LinearModel
+    trim : Trim
+    name : str
+        Of the derivative.
+    row : str
+        State in whose equation it stands.
+    column : int
+        Of the input.
+    gain : float
+        Of the input.
+    """
+    V, sine, cosine = trim.airspeed_mps, np.sin(trim.alpha_rad), np.cos(trim.alpha_rad)
+    measured = {
+        "airspeed_mps": {"ax_mps2": cosine, "az_mps2": sine},
+        "alpha_rad": {"ax_mps2": -V * sine, "az_mps2": V * cosine},
+        "beta_rad": {"ay_mps2": V},
+    }
+    found = [Term("B", model.states.index(row), column, name, gain)]
+    for output, share in measured.get(row, {}).items():
+        if output in model.outputs:
+            at = model.outputs.index(output)
+            found.append(Term("D", at, column, name, float(share) * gain))
     return found

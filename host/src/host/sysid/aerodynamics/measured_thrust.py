@@ -44,7 +44,7 @@ def thrust_column(columns: Mapping[str, Array], powerplant: Powerplant) -> Fligh
         return FlightThrust(columns["thrust_n"], True, (f"thrust as measured{of_power}",))
     if "power_w" in columns and "airspeed_mps" in columns:
         power, speed = columns["power_w"], columns["airspeed_mps"]
-        if powerplant.of_power is not None:
+        if powerplant.of_power is not None and "density_kgpm3" in columns:
             thrust = powerplant.of_power(power, speed, columns["density_kgpm3"])
             return FlightThrust(thrust, True, ("thrust by the measured power and the propeller",))
         thrust = EFFICIENCY * power / np.maximum(speed, LEAST_MPS)

@@ -21,7 +21,7 @@ from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.sysid.aerodynamics.gust_reckoning import AXES, gust_motion, turning
-from host.sysid.aerodynamics.left_out_terms import LeftOutTerm
+from host.sysid.aerodynamics.left_out_terms import LeftOutTerm, acting_terms
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
@@ -90,6 +90,8 @@ class VaryingModel:
         Angular momentum of the rotor along x and z.
     left_out : tuple of LeftOutTerm
         Of a reduced template, as parameters behind its own.
+    thrust : tuple of LeftOutTerm
+        What measured thrust does, likewise.
     """
 
     base: LinearModel
@@ -98,6 +100,7 @@ class VaryingModel:
     airframe: AirframeData | None
     spin_kgm2ps: tuple[float, float] = (0.0, 0.0)
     left_out: tuple[LeftOutTerm, ...] = ()
+    thrust: tuple[LeftOutTerm, ...] = ()
 
     def __post_init__(self) -> None:
         if self.axis not in SECOND_ORDER_TERMS:
@@ -115,6 +118,11 @@ class VaryingModel:
             if key[1] > 0 and key not in found:
                 found.append(key)
         return tuple(found)
+
+    @property
+    def beside(self) -> tuple[LeftOutTerm, ...]:
+        """Terms of measured columns that the template has not."""
+        return (*self.left_out, *self.thrust)
 
     @property
     def forces(self) -> tuple[str, ...]:
@@ -147,23 +155,19 @@ class VaryingModel:
                 terms.append(Term(matrix, term.row, place, term.parameter, term.gain))
         rests = m + len(scaled) + n + len(self.forces)
         beside = rests + len(second_order) + (len(airspeed) > 0)
-        turning_states, gusts = GUST_TURNING_STATES[self.axis], beside + len(self.left_out)
+        turning_states, gusts = GUST_TURNING_STATES[self.axis], beside + len(self.beside)
         size = gusts + len(turning_states) * (1 + len(AXES))
         B, D = np.zeros((n, size)), np.zeros((p, size))
         B[:, :m], D[:, :m] = base.B, base.D
         B[:, m + len(scaled) : m + len(scaled) + n] = np.eye(n)
         for k, force in enumerate(self.forces):
             D[base.outputs.index(force), m + len(scaled) + n + k] = 1.0
-        turn = {"ax_mps2": np.cos(self.trim.alpha_rad), "az_mps2": np.sin(self.trim.alpha_rad)}
         for k, (name, row, _) in enumerate(second_order):
-            terms.append(Term("B", base.states.index(row), rests + k, name))
-            for force in self.forces if row == "airspeed_mps" else ():
-                at = base.outputs.index(force)
-                terms.append(Term("D", at, rests + k, name, float(turn[force])))
+            terms += acting_terms(base, self.trim, name, row, rests + k)
         for name, row in airspeed:
-            terms += self._acting(name, row, beside - 1)
-        for k, extra in enumerate(self.left_out):
-            terms += self._acting(extra.name, extra.row, beside + k)
+            terms += acting_terms(base, self.trim, name, row, beside - 1)
+        for k, extra in enumerate(self.beside):
+            terms += acting_terms(base, self.trim, extra.name, extra.row, beside + k, extra.gain)
         more: tuple[Parameter, ...] = ()
         if turning_air:
             share = STEADY_SHARE * self.trim.airspeed_mps
@@ -185,7 +189,7 @@ class VaryingModel:
                 *(f"rest of {name}" for name in (*base.states, *self.forces)),
                 *(f"{column} by alpha on {row}" for _, row, column in second_order),
                 *(("airspeed over its trim",) if airspeed else ()),
-                *(f"{t.column} left out of {t.row}" for t in self.left_out),
+                *(f"{t.column} left out of {t.row}" for t in self.beside),
                 *(f"turning {of} on {row}" for row in turning_states for of in ("gust", *AXES)),
             ),
             B=B,
@@ -194,18 +198,10 @@ class VaryingModel:
             parameters=(
                 *base.parameters,
                 *(Parameter(name) for name, *_ in (*second_order, *airspeed)),
-                *(Parameter(t.name) for t in self.left_out),
+                *(Parameter(t.name) for t in self.beside),
                 *more,
             ),
         )
-
-    def _acting(self, name: str, row: str, column: int) -> list[Term]:
-        """Return the terms of a derivative of an input: side force is measured too."""
-        found = [Term("B", self.base.states.index(row), column, name)]
-        if row == "beta_rad" and "ay_mps2" in self.forces:
-            side = self.base.outputs.index("ay_mps2")
-            found.append(Term("D", side, column, name, self.trim.airspeed_mps))
-        return found
 
     def _moving(self, values: Array) -> Array:
         """Return an input between its samples: its mean, held; on a line what a reduced template
@@ -248,7 +244,7 @@ class VaryingModel:
         ]
         if AIRSPEED_TERMS[self.axis]:
             inputs.append(self._moving(ratio - 1.0))
-        inputs += [self._moving(_deviation(columns[t.column])) for t in self.left_out]
+        inputs += [self._moving(_deviation(columns[t.column])) for t in self.beside]
         gust, steady = gust_motion(columns, dt_s)
         motions = [gust, *(steady[:, :, k] for k in range(len(AXES)))]
         turns = [turning(columns, motion) for motion in motions]

@@ -7,11 +7,13 @@ from dataclasses import replace
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
+from host.sysid.aerodynamics.thrust_terms import THRUST, beside_thrust, thrust_terms
 from host.sysid.estimators.filter_error_gust import GustFit, fit_with_gust
 from host.sysid.estimators.gust_delays import advance_outputs
-from host.sysid.flight.trim_departure import correct_trim_departure
+from host.sysid.flight.trim_departure import correct_trim_departure, without_further_inputs
+from host.sysid.models.fit_result import without_parameters
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.state_space_model import LinearModel, without_inputs
 from host.sysid.models.templates import Trim
 
 
@@ -48,10 +50,17 @@ def fit_gust_at_trim(
         The fit, and the maneuvers without delays: as measured, and as fitted.
     """
     bare = replace(model, delays=())
-    rough = fit_with_gust(bare, data, trim.airspeed_mps, roughly=True).result
-    at_trim, before = list(data), None
+    thrust = thrust_terms(bare, cuts, trim, airframe)
+    wide, driven = beside_thrust(bare, data, cuts, thrust, trim) if thrust else (bare, list(data))
+    rough = fit_with_gust(wide, driven, trim.airspeed_mps, roughly=True).result
+    even = None  # as if thrust had not changed
+    if thrust:
+        even = without_further_inputs(rough.model, driven, data, rough.estimate)
+        alone = without_inputs(rough.model, (THRUST,))
+        rough = without_parameters(rough, alone, [t.name for t in thrust])
+    at_trim, before = even or list(data), None
     if rough.residual_kind == "innovation":
-        departure = correct_trim_departure(rough, data, cuts, airframe, trim, spin)
+        departure = correct_trim_departure(rough, data, cuts, airframe, trim, spin, even)
         before = rough if departure is None else departure.corrected(rough)
         if departure is not None:
             at_trim = departure.removed_from(data, before.estimate)

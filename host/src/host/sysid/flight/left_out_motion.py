@@ -15,6 +15,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.sysid.aerodynamics.left_out_terms import LEFT_OUT_TERMS, NEEDED
+from host.sysid.aerodynamics.thrust_terms import thrust_terms
 from host.sysid.estimators.gust_delays import advance_outputs
 from host.sysid.estimators.method_registry import fit
 from host.sysid.flight.trim_departure import Departure, correct_trim_departure
@@ -84,7 +85,7 @@ def fit_beside_left_out(
     options : mapping
         Of the method.
     """
-    if model.name not in LEFT_OUT_TERMS:
+    if model.name not in LEFT_OUT_TERMS and not thrust_terms(model, cuts, trim, airframe):
         return None
     rough = fit("output-error-white", replace(model, delays=()), data, multiple_starts=False)
     found = correct_trim_departure(rough, data, cuts, airframe, trim, spin)

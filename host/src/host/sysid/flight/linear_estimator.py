@@ -21,6 +21,7 @@ from host.sysid.aerodynamics.coefficient_table import (
     coefficients,
     trim_of,
 )
+from host.sysid.aerodynamics.thrust_terms import THRUST_BESIDE, with_thrust
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_corrections import corrections
 from host.sysid.estimators.filter_error_gust import without_gust_parameters
@@ -124,6 +125,7 @@ class LinearEstimator:
             If there is no such maneuver, a column is missing, or the fit does not come about.
         """
         own = self.own
+        flights = [replace(f, corrected=with_thrust(f.corrected, self.powerplant)) for f in flights]
         axes = AXIS_OF[self.template] if own is None else excited_axes(own.inputs)
         named = self.named or own is not None
         used, held = fitted_and_held_out(flights, axes, self.template, named=named)
@@ -194,6 +196,8 @@ class LinearEstimator:
             left = beside.departure
         elif trim.known and self.own is None and found.residual_kind in FREE:
             left = correct_trim_departure(found, data, departing, self.airframe, trim, spin, fitted)
+        if left is not None and left.varying.thrust:
+            found = replace(found, warnings=(*found.warnings, THRUST_BESIDE))
         return LinearEstimate(
             template=self.template if self.own is None else model.name,
             method=method,

@@ -16,7 +16,6 @@ from host.sysid.aerodynamics.coefficient_table import (
     ShiftedEstimate,
     coefficient_parts,
 )
-from host.sysid.aerodynamics.left_out_terms import LEFT_OUT_TERMS
 from host.sysid.aerodynamics.path_thrust import path_thrust
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_dynamics import DELAYED_COLUMNS, IMU_DELAY, SERVO_DELAY
@@ -170,8 +169,9 @@ def _shifts(
     shifts: tuple[ShiftedEstimate, ...] = () if e.departure is None else e.departure.remainders
     carriers = _carriers(e)
     known = [c for c in carriers if c is not None]
-    # What a reduced model leaves out would pass for what is open of sensors and surfaces.
-    fitted = e.at_trim(e.estimate) if e.template in LEFT_OUT_TERMS else list(e.maneuvers)
+    # What was fitted beside the model would pass for what is open of sensors and surfaces.
+    beside = e.departure is not None and bool(e.departure.beside)
+    fitted = e.at_trim(e.estimate) if beside else list(e.maneuvers)
     if len(known) == len(carriers):
         moved = systematic_error_shifts(statistical, fitted, e.cuts, known, e.trim)
         # Of servos that were estimated the covariance has what they leave open, and the IMU's

@@ -39,6 +39,7 @@ from host.sysid.aerodynamics.left_out_terms import (
     terms_left_out,
 )
 from host.sysid.aerodynamics.path_thrust import rotor_means
+from host.sysid.aerodynamics.thrust_terms import thrust_terms
 from host.sysid.aerodynamics.unmeasured_motion import with_unmeasured
 from host.sysid.aerodynamics.varying_airspeed import MEASURED, SECOND_ORDER_TERMS, VaryingModel
 from host.sysid.estimators.gust_model import gust_deviation_mps
@@ -55,6 +56,7 @@ TURNED_ANGLES = ("alpha_rad", "beta_rad")
 REMAINDER_SHARE = 0.25  # of the step: what one step and terms of second order leave open
 DEPARTURES = "departures from the linear model"
 DRAG_POLAR = "curvature of the drag polar"
+THRUST_ACTS = "curvature of the drag polar, and what thrust does"
 LEFT_OUT = "motion that the model leaves out"
 TURNING_AIR = "gust along the path, turning with the aircraft"
 # Deviation of that gust, in the deviation of the gusts found. Near the ground it is 1.3 of theirs
@@ -87,7 +89,8 @@ class Departure:
     maneuvers : tuple of Maneuver
         Those fitted, with these inputs.
     beside : dict
-        Terms that a reduced template leaves out: what is expected, and one deviation.
+        Terms that a template has not, of motion or thrust that was measured: what is expected, and
+        one deviation.
     """
 
     shares: Array
@@ -178,27 +181,47 @@ class Departure:
     def _removed(
         self, departing: Sequence[Maneuver], maneuvers: Sequence[Maneuver], estimate: Array
     ) -> list[Maneuver]:
-        if not maneuvers:
-            return []
-        trimmed = [
-            replace(
-                wide,
-                inputs=np.hstack(
-                    [own.inputs, np.zeros_like(wide.inputs[:, own.inputs.shape[1] :])]
-                ),
-            )
-            for wide, own in zip(departing, maneuvers, strict=True)
-        ]
-        problems = [OutputProblem(self.model, data) for data in (departing, trimmed)]
-        theta = problems[0].first_guess()
-        theta[: problems[0].n_common] = estimate[: problems[0].n_common]
-        there, here = (problem.outputs(theta) for problem in problems)
-        if there is None or here is None:
-            return list(maneuvers)
-        return [
-            replace(m, outputs=m.outputs - (moved - still).T)
-            for m, moved, still in zip(maneuvers, there, here, strict=True)
-        ]
+        return without_further_inputs(self.model, departing, maneuvers, estimate)
+
+
+def without_further_inputs(
+    model: LinearModel,
+    departing: Sequence[Maneuver],
+    maneuvers: Sequence[Maneuver],
+    estimate: Array,
+) -> list[Maneuver]:
+    """Return maneuvers as if the further inputs of a model had been none; as they are if it
+    diverges.
+
+    Parameters
+    ----------
+    model : LinearModel
+    departing : sequence of Maneuver
+        With all inputs of the model.
+    maneuvers : sequence of Maneuver
+        The same, with the first of them.
+    estimate : Array
+        Common parameters first.
+    """
+    if not maneuvers:
+        return []
+    trimmed = [
+        replace(
+            wide,
+            inputs=np.hstack([own.inputs, np.zeros_like(wide.inputs[:, own.inputs.shape[1] :])]),
+        )
+        for wide, own in zip(departing, maneuvers, strict=True)
+    ]
+    problems = [OutputProblem(model, data) for data in (departing, trimmed)]
+    theta = problems[0].first_guess()
+    theta[: problems[0].n_common] = estimate[: problems[0].n_common]
+    there, here = (problem.outputs(theta) for problem in problems)
+    if there is None or here is None:
+        return list(maneuvers)
+    return [
+        replace(m, outputs=m.outputs - (moved - still).T)
+        for m, moved, still in zip(maneuvers, there, here, strict=True)
+    ]
 
 
 def correct_trim_departure(
@@ -244,15 +267,23 @@ def correct_trim_departure(
     one_step = one_step_of(result, maneuvers if fitted is None else fitted, trim)
     if one_step is None:
         return None
-    varying = VaryingModel(base, base.name, trim, airframe, spin, left_out)
+    thrust = thrust_terms(base, cuts, trim, airframe)
+    varying = VaryingModel(base, base.name, trim, airframe, spin, left_out, thrust)
     # Without accelerometers the lift of pitching passes for a scale of alpha: nothing is guessed.
     guessed = assumed and not left_out
     if guessed and not varying.forces:
         return None
-    straight = _with_second_order(varying.model, base, {})
-    beside = _left_out(result, left_out)
-    curvature = _curvature_sd(result, trim) | {name: sd for name, (_, sd) in beside.items()}
-    curved = [_with_second_order(varying.model, base, {name: 1.0}) for name in curvature]
+    beside = _left_out(result, (*left_out, *thrust))
+    expected = {t.name: beside[t.name][0] for t in thrust}
+    straight = _with_second_order(varying.model, base, expected)
+    polar = _curvature_sd(result, trim)
+    along = polar | {name: sd for name, (_, sd) in beside.items()}
+    curved = [
+        _with_second_order(varying.model, base, {**expected, name: expected.get(name, 0.0) + 1.0})
+        for name in along
+    ]
+    if thrust:  # what is fitted with it has the drag polar beside it
+        beside = {name: (0.0, sd) for name, sd in polar.items()} | beside
     data = [
         replace(m, inputs=varying.maneuver(c, m.dt_s).inputs)
         for m, c in zip(maneuvers, cuts, strict=True)
@@ -260,12 +291,12 @@ def correct_trim_departure(
     if guessed and _linear(one_step, result, maneuvers, straight, data, trim):
         return None
     bends = [(model, data) for model in curved]
-    found = one_step.joint(straight, trim, data, bends, list(curvature.values()))
+    found = one_step.joint(straight, trim, data, bends, list(along.values()))
     if not np.isfinite(found.shares).all():
         return None
     step = found.shares.sum(axis=0)
     unknown = _root(found.covariance) @ found.by_added
-    cause = LEFT_OUT if left_out else DRAG_POLAR
+    cause = LEFT_OUT if left_out else THRUST_ACTS if thrust else DRAG_POLAR
     # Only the fit that stands has intervals: the rough one before it is measured as it is.
     along_mps = 0.0 if fitted is None else gust_deviation_mps(result, trim.airspeed_mps)
     turned: Array = np.zeros((0, len(step)))
@@ -280,6 +311,10 @@ def correct_trim_departure(
         drawn = [one_step.change(straight, trim, one) - still for one in noisy]
         fitted_too = np.diag(result.covariance) > 0.0  # what the fit left out stays out
         noise = consider_covariance(np.vstack(drawn) * fitted_too / np.sqrt(DRAWS))
+    known = {
+        name: expected.get(name, 0.0) + float(value)
+        for name, value in zip(along, found.added, strict=True)
+    }
     return Departure(
         found.shares,
         (
@@ -289,9 +324,7 @@ def correct_trim_departure(
         ),
         noise,
         varying,
-        _with_second_order(
-            varying.model, base, dict(zip(curvature, map(float, found.added), strict=True))
-        ),
+        _with_second_order(varying.model, base, known),
         tuple(data),
         beside,
     )
