@@ -23,6 +23,7 @@ import numpy as np
 
 from host.arrays import Array, BoolArray
 from host.sysid.estimators.multistart import multistart
+from host.sysid.models.covariance_root import covariance_root
 from host.sysid.numerics.ar_noise import ArNoise, choose_order, fit_ar, lagged_moments
 from host.sysid.numerics.between_samples import left_between_samples
 from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
@@ -211,7 +212,7 @@ def _fit_ar_models(
     for round_number in range(MOMENT_ROUNDS):
         information, _ = _information(problem, optimum, memory, variance)
         covariance = covariance_of_free(information, optimum.free, problem.names)
-        lower = _matrix_root(covariance)
+        lower = covariance_root(covariance)
         updated, change = [], 0.0
         variance = variance.copy()
         for j in range(len(memory)):
@@ -247,11 +248,6 @@ def _fit_ar_models(
         if change < COEFFICIENT_CHANGE:
             break
     return memory, variance, selected
-
-
-def _matrix_root(covariance: Array) -> Array:
-    value, vector = np.linalg.eigh(covariance)
-    return np.asarray(vector * np.sqrt(np.maximum(value, 0.0)), dtype=np.float64)
 
 
 def _satterthwaite(

@@ -23,6 +23,8 @@ from host.sysid.numerics.nonlinear_problem import output_problem
 SINGULAR = 1e-12  # of the largest eigenvalue of the scaled information
 HALF_WAY = 0.5  # from one model or data to another: beyond it the record is nearer to the other
 CERTAIN_SD = 2.0  # deviations
+# Times the variance without other unknowns: beyond it nothing tells a parameter from another one.
+MOST_INFLATED = 1e6
 
 Residuals = Callable[[LinearModel, Trim, Sequence[Maneuver]], "list[Array] | None"]
 
@@ -167,10 +169,19 @@ class OneStep:
 
     def widened_in(self, result: FitResult) -> float:
         """Return by how much the intervals of a result are wider than white noise makes them: the
-        most of all, at least one."""
-        bare = np.zeros(self.length)
+        most of all, at least one.
+
+        Of parameters that nothing tells apart rounding made both variances. Where two of them said
+        a factor of 980 000, what lies between samples widened Cm_q from 1 to 34 per cent.
+        """
+        bare, information = np.zeros(self.length), np.zeros(self.length)
         bare[self.target] = np.diag(self.inverse)[self.source]
-        known = (bare > 0.0) & (result.standard_error > 0.0)
+        alone = np.zeros(len(self.inverse))
+        for J, own in zip(self.slopes, self.columns, strict=True):
+            alone[own] += np.sum(J[:, : len(own)] ** 2, axis=0)
+        information[self.target] = alone[self.source]
+        apart = result.standard_error**2 * information < MOST_INFLATED
+        known = apart & (bare > 0.0) & (result.standard_error > 0.0)
         return float(np.max(result.standard_error[known] / np.sqrt(bare[known]), initial=1.0))
 
     def _placed(self, unknowns: Array) -> Array:

@@ -25,6 +25,7 @@ from host.sysid.flight.noise_model_limits import (
     rarely_exceeded,
     slopes_of_means,
 )
+from host.sysid.models.covariance_root import covariance_root
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
@@ -120,8 +121,7 @@ def largest_rms(
     It is exceeded in 1 % of cases by any output; infinite where the model diverges.
     """
     count, outputs = len(model.parameter_names), len(model.outputs)
-    value, vector = np.linalg.eigh(result.covariance[:count, :count])
-    root = vector * np.sqrt(np.maximum(value, 0.0))
+    root = covariance_root(result.covariance[:count, :count])
     rng = np.random.default_rng(DRAW_SEED)
     parameters = rng.standard_normal((DRAWS, count)) @ root.T
     squares, samples = np.zeros((DRAWS, outputs)), 0

@@ -13,6 +13,7 @@ from scipy import special
 
 from host.arrays import Array
 from host.constants import NORMAL_95
+from host.sysid.models.covariance_root import covariance_root
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
@@ -307,9 +308,8 @@ def bound_exceedance_probability(
     """
     model, count = result.model, len(result.model.parameters)
     mean, covariance = shrunk_estimate(result, maneuvers)
-    value, vector = np.linalg.eigh(covariance)
-    root = vector * np.sqrt(np.maximum(value, 0.0))
-    draws = mean + np.random.default_rng(DRAW_SEED).standard_normal((DRAWS, count)) @ root.T
+    noise = np.random.default_rng(DRAW_SEED).standard_normal((DRAWS, count))
+    draws = mean + noise @ covariance_root(covariance).T
     values = _reference_values(model, regressor_rms(model, maneuvers), draws, small_share)
     over = result.standard_error[:count] > RELATIVE_BOUND_LIMIT * values
     return np.asarray(np.mean(over, axis=0)), float(np.mean(np.any(over, axis=1)))

@@ -27,6 +27,7 @@ import numpy as np
 from scipy import special
 
 from host.arrays import Array, BoolArray
+from host.sysid.models.covariance_root import covariance_root
 from host.sysid.numerics.ar_noise import ArNoise, choose_order, fit_ar, lagged_moments
 from host.sysid.numerics.information_inverse import (
     covariance_from_information,
@@ -168,8 +169,7 @@ class _Fitted:
     @classmethod
     def of(cls, total: Array, score: Array) -> _Fitted:
         inverse = identified_inverse(total)
-        value, vector = np.linalg.eigh(inverse)
-        return cls(inverse, vector * np.sqrt(np.maximum(value, 0.0)), score)
+        return cls(inverse, covariance_root(inverse), score)
 
 
 def input_coherence(
