@@ -129,6 +129,15 @@ def test_an_input_that_wanders_and_jumps_is_no_inner_loop(seed: int) -> None:
     assert found_in(flown("lateral", open_loop, None, seed, gust_rad=0.03)) == []
 
 
+@pytest.mark.parametrize("seed", [1, 2, 4])
+def test_guidance_onto_a_line_is_named_where_heading_is_no_column(seed: int) -> None:
+    """Neither heading nor the distance from the line is one: rates tell the quick part of both
+    angles, without the noise of an attitude. It was silent."""
+    [found] = found_in(tracked(seed, 16.0, line=True))
+    assert found.text.startswith("aileron_rad follows ")
+    assert found.text.endswith(", about a command that changes slowly, heading by rates")
+
+
 @pytest.mark.parametrize(("seed", "leg_s"), [(19500, 12.0), (19502, 12.0), (19500, 4.0)])
 def test_a_tracker_is_named_where_heading_is_no_column(seed: int, leg_s: float) -> None:
     """The rates tell it, but for a drift; without them bank alone is no law.

@@ -41,7 +41,7 @@ INNER_LOOP: dict[str, tuple[str, ...]] = {
     "aileron_rad": ("p_radps", "phi_rad", "psi_rad"),
     "elevator_rad": ("q_radps", "theta_rad", "alpha_rad"),
 }
-TURNING = ("q_radps", "r_radps", "phi_rad", "theta_rad")  # tell how heading changes
+TURNING = ("p_radps", "q_radps", "r_radps", "phi_rad", "theta_rad")  # tell how angles change
 MOMENT = {"elevator_rad": "M", "aileron_rad": "L", "rudder_rad": "N"}
 LABEL = {
     "elevator_rad": "de", "aileron_rad": "da", "rudder_rad": "dr", "airspeed_mps": "V",
@@ -174,28 +174,39 @@ def _inner_loop(
     """Return the law of a surface whose command no column tells, and that in words.
 
     A guidance by the distance from a line or by a waypoint moves it slowly. What an aircraft
-    answers to a pilot has the other sign.
+    answers to a pilot has the other sign. Bank and heading are those by rates where these are
+    there: noise of a measured angle hides most of its quick part.
     """
     names = INNER_LOOP.get(surface, ())
     if not names or not windows or any(name not in columns for name in names[:2]):
         return None, ""
     signals = {n: columns[n] for n in names if n in columns}
+    if surface == "aileron_rad":
+        signals |= _angles_by_rates(columns)
     law = fast_feedback(_period_s(columns), columns[surface], signals, windows)
-    if law is None or names[1] not in law.signals:
+    if law is None or not set(ATTITUDE) & set(law.signals):
         return None, ""
     gains = zip(law.signals, law.gains, strict=True)
     if any(HOLDING[surface, name] * gain < 0.0 for name, gain in gains):
         return None, ""
-    return law, ", about a command that changes slowly"
+    by_rates = ", heading by rates" if HEADING in law.signals and HEADING not in columns else ""
+    return law, f", about a command that changes slowly{by_rates}"
 
 
 def _heading(columns: Mapping[str, Array]) -> Array | None:
     """Return heading; where no column has it, by rates: its drift is little within a leg."""
-    if HEADING in columns or any(name not in columns for name in TURNING):
-        return columns.get(HEADING)
-    q, r, phi, theta = (columns[name] for name in TURNING)
-    rate = (q * np.sin(phi) + r * np.cos(phi)) / np.cos(theta)
-    return np.asarray(cumulative_trapezoid(rate, dx=_period_s(columns), initial=0))
+    return columns[HEADING] if HEADING in columns else _angles_by_rates(columns).get(HEADING)
+
+
+def _angles_by_rates(columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Return bank and heading by the integrals of the body rates; empty where one is missing."""
+    if any(name not in columns for name in TURNING):
+        return {}
+    p, q, r, phi, theta = (columns[name] for name in TURNING)
+    heading_rate = (q * np.sin(phi) + r * np.cos(phi)) / np.cos(theta)
+    rates = {"phi_rad": p + np.sin(theta) * heading_rate, HEADING: heading_rate}
+    dt_s = _period_s(columns)
+    return {n: cumulative_trapezoid(v, dx=dt_s, initial=0) for n, v in rates.items()}
 
 
 def _period_s(columns: Mapping[str, Array]) -> float:
