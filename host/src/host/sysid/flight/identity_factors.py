@@ -81,6 +81,11 @@ class Factor:
     explained: float  # share of the column's motion, of what the other parts leave
 
     @property
+    def chance(self) -> float:
+        """One deviation of the slope by noise on the left, as a share of it."""
+        return float(np.sqrt((1.0 - self.explained) / (self.explained * len(self.law.rate))))
+
+    @property
     def certain(self) -> bool:
         """Whether the sign is."""
         return self.explained >= SIGN_CORRELATION**2

@@ -45,12 +45,14 @@ UNDRIVEN_EXPLAINED = 0.75  # of a wind angle that no surface drives: of less the
 QUIET_RADPS = 0.02  # noise of a still sensor follows nothing
 BLOCK_S, SLOW_S = 0.1, 0.5  # slopes are those of means over this long; slow: pitot and GPS
 FEWEST = 32  # means
+CHANCE = 3.0  # deviations, of a slope of the speed, which gusts along the path change too
 OVER_AIRSPEED = " over airspeed_mps"  # ends the name of a part that the airspeed divides
 ALONG, ACROSS = ("elevator_rad",), ("aileron_rad", "rudder_rad")  # what drives which
 DRIVING_RAD = 0.05  # a surface that swings less is a hand that answers, not a test input
 # Right sensors: tilt of an IMU, zero of a vane, delay of a pitot, one deviation each; and thrust
 # that a forward force does not feel, at full throttle.
 TILT_RAD, ZERO_RAD, PITOT_DELAY_S, THRUST_MPS2 = 0.03, 0.05, 0.3, 10.0
+SHEAR_PER_S = 0.05  # of a head wind with height, one deviation: light by ICAO is below 0.067
 UNIT_OF_FORCE = 5.0  # speed against force: thrust, wind and a slow pitot stay below, g is 9.8
 # What is compared, by the column that changes and what it is held against.
 CHECK_OF = {
@@ -189,7 +191,8 @@ def _judge(f: Factor) -> Finding | None:
             (f"the wrong sign of one of them: {HINT}",),
             wrong_unit=True,
         )
-    if f.low <= LARGEST_FACTOR and f.high >= 1.0 / LARGEST_FACTOR:
+    within = LARGEST_FACTOR * (1.0 + (CHANCE * f.chance if speed else 0.0))
+    if f.low <= within and f.high >= 1.0 / within:
         return None
     times = f.low if f.low > 1.0 else f.high
     return Finding(
@@ -365,8 +368,11 @@ def _slow(m: Mapping[str, Array]) -> Iterator[Identity]:
         theta, phi = m["theta_rad"], m.get("phi_rad", zero)
         alpha = m["alpha_rad"] if "alpha_rad" in m else _pitch_over_path(m)
         fall = np.sin(alpha) * np.cos(theta) * np.cos(phi) - np.cos(alpha) * np.sin(theta)
-        known = GRAVITY_MPS2 * fall + np.sin(alpha) * m["az_mps2"]
+        # Without a vane the path is a guess, which would take the force's part.
+        climb = m["airspeed_mps"] * np.sin(theta - alpha) if "alpha_rad" in m else zero
         along = {"ax_mps2": np.cos(alpha) * m["ax_mps2"]}
+        known = GRAVITY_MPS2 * fall + np.sin(alpha) * m["az_mps2"]
+        known = known + _shear(_law("airspeed_mps", m, along, (climb,), known=known)) * climb
         # An IMU that is tilted in the aircraft lets lift and side force lean into ax. Vanes show
         # the angle; without them 1.7 deg made speed move 1.5 times as fast as ax said.
         lean = (m["az_mps2"], m.get("ay_mps2", zero))
@@ -379,6 +385,7 @@ def _slow(m: Mapping[str, Array]) -> Iterator[Identity]:
                 ZERO_RAD * (lean[0] + weight * np.cos(phi)),
                 ZERO_RAD * (lean[1] + weight * np.sin(phi)),
                 THRUST_MPS2 * m.get("throttle", zero),
+                SHEAR_PER_S * climb,
             )
             pitot = {"": PITOT_DELAY_S}
             yield _law(
@@ -386,6 +393,19 @@ def _slow(m: Mapping[str, Array]) -> Iterator[Identity]:
             )
     if "altitude_m" in m and "v_down_mps" in m:
         yield _law("altitude_m", m, {"v_down_mps": -m["v_down_mps"]})
+
+
+def _shear(law: Identity) -> float:
+    """Return the likeliest change of head wind with height, 1/s, beside any factor of the force.
+
+    It is what stands beside the only part of the identity, within what shear usually is: a force
+    that is turned round stays one.
+    """
+    (part,), (climb,) = law.parts.values(), law.beside
+    columns = np.column_stack([np.ones(len(climb)), part, climb])
+    noise = max(float(np.mean(without(law.rate, columns) ** 2)), 1e-12)
+    x, y = (without(v, columns[:, :2]) for v in (climb, law.rate))
+    return float(x @ y) / (float(x @ x) + noise / SHEAR_PER_S**2)
 
 
 def _pitch_over_path(m: Mapping[str, Array]) -> Array:
