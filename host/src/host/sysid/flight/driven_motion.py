@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from scipy.special import chdtri
@@ -25,7 +26,7 @@ LAGS_STEPS = (0.0, 1.5, 4.0, 10.0, 30.0, 100.0)  # of first order, behind a surf
 ROWS_EACH = 8  # for each number that is fitted: with fewer it explains gusts too
 SENSOR_SHARE, SENSOR_DELAY_S = 0.1, 0.03  # scale, delay and place of right sensors, one deviation
 UNKNOWN_SHARE = 0.1  # of a motion, that they make of it in other ways
-SHORTEST_S = 20.0  # a trend of a shorter record is explained by chance
+SHORTEST_S = 19.0  # of 20 with its ends: a trend of a shorter record is explained by chance
 CERTAIN = 9.0  # of a chi-square of one unknown: three deviations
 LIKELIER = 1.0  # of the same, one deviation: below it nothing is told of two units
 CERTAIN_P = 0.0027  # the same, as what chance exceeds
@@ -188,19 +189,31 @@ def shared_factor(shares: Sequence[tuple[Identity, str]], tried: Iterable[float]
 
 
 def likelier_factor(
-    shares: Sequence[tuple[Identity, str]], tried: Collection[float]
+    shares: Sequence[tuple[Identity, str]],
+    tried: Collection[float],
+    unlikely: Mapping[float, float] = MappingProxyType({}),
 ) -> float | None:
     """Return the factor with which parts of several identities agree better than as they are.
 
-    No proof: the likeliest of those tried, None where all explain less of what surfaces drive. The
-    arguments are those of `shared_factor`.
+    No proof: the likeliest of those tried, None where all explain less of what surfaces drive.
+
+    Parameters
+    ----------
+    shares, tried
+        As `shared_factor`.
+    unlikely : mapping
+        How many deviations squared a factor is from what is usual, where that is known.
     """
     tests = [(DrivenTest(law), name) for law, name in shares if law.driven and testable(law)]
     if not tests:
         return None
-    broken = {f: sum(test.misfit(name, f) for test, name in tests) for f in (1.0, *tried)}
+    broken = {
+        f: sum(test.misfit(name, f) for test, name in tests) + unlikely.get(f, 0.0)
+        for f in (1.0, *tried)
+    }
     slope = min(broken, key=broken.__getitem__)
-    return slope if broken[1.0] - broken[slope] > LIKELIER else None
+    told = LIKELIER * (2.0 if unlikely else 1.0)  # what is usual is a second measure
+    return slope if broken[1.0] - broken[slope] > told else None
 
 
 def testable(law: Identity) -> bool:

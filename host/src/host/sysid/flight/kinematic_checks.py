@@ -36,6 +36,7 @@ from host.sysid.flight.identity_factors import (
     factors,
     without,
 )
+from host.sysid.flight.side_force import unlikely_factors
 
 UNIT_MARGIN = 1.1  # about the range of factors: a unit's outside it is none
 MOTION_SHARE = 0.3  # of what a law leaves: with less it is noise
@@ -96,7 +97,7 @@ def consistent(flown: Mapping[str, Array], dt_s: float, *, weighed: bool = True)
             findings += [one for f in _told(law) if (one := _judge(f)) is not None]
         findings += map(_judge_driven, driven_factors(law) if weighed else ())
     if weighed and not any(f.wrong_unit for f in findings):
-        findings += _judge_airspeed(laws)
+        findings += _judge_airspeed(laws) or _judge_units(laws, _means(flown, dt_s, BLOCK_S))
     return findings
 
 
@@ -130,14 +131,18 @@ def _told(law: Identity) -> Iterator[Factor]:
 
 def identities(flown: Mapping[str, Array], dt_s: float) -> Iterator[Identity]:
     """Return all identities that the columns allow."""
-    duration_s = dt_s * len(flown["t_s"])
     for length_s, laws in ((BLOCK_S, _fast), (SLOW_S, _slow)):
-        # A record whose clock runs too fast is short, and must not escape by that.
-        block = max(1, round(min(length_s, duration_s / (4 * FEWEST)) / dt_s))
-        means = block_means(flown, block)
+        means = _means(flown, dt_s, length_s)
         if len(means["t_s"]) < FEWEST:
             continue
         yield from laws(means)
+
+
+def _means(flown: Mapping[str, Array], dt_s: float, length_s: float) -> dict[str, Array]:
+    """Return means over a time, or over less where the record is short."""
+    # A record whose clock runs too fast is short, and must not escape by that.
+    short_s = dt_s * len(flown["t_s"]) / (4 * FEWEST)
+    return block_means(flown, max(1, round(min(length_s, short_s) / dt_s)))
 
 
 def block_means(flown: Mapping[str, Array], block: int) -> dict[str, Array]:
@@ -220,37 +225,53 @@ def _judge_driven(f: DrivenFactor) -> Finding:
 
 def _judge_airspeed(laws: Sequence[Identity]) -> list[Finding]:
     """Return the finding of an airspeed whose unit only lift and side force together tell."""
-    parts = [(law, name) for law in laws for name in law.parts if name.endswith(OVER_AIRSPEED)]
+    parts = _over_airspeed(laws)
     gains = [gain for gain in UNITS["mps"].values() if gain != 1.0]
     times = shared_factor(parts, [*gains, *(1.0 / gain for gain in gains)])
     if times is None:
-        sides = [(law, "ay_mps2") for law in laws if "ay_mps2" in law.terms]
-        by_speed = {1.0 / gain: unit for unit, gain in UNITS["mps"].items() if gain != 1.0}
-        # That a side force is too little shows, as in g; that it is too much does not.
-        by_force = {gain: unit for unit, gain in UNITS["mps2"].items() if gain > 1.0}
-        both = (("airspeed_mps", parts, by_speed), ("ay_mps2", sides, by_force))
-        return [one for name, shares, units in both for one in _likelier_unit(name, shares, units)]
+        return []
     channels = dict.fromkeys(c for _, name in parts for c in reversed(_channels(name)))
     text = f"airspeed_mps is about {times:.2g} times what forces make of it in what surfaces drive"
     causes = (f"{UNIT}: {HINT}", "scales of vanes or airspeed")
     return [Finding("alpha-against-az", (*channels,), text, causes, wrong_unit=True)]
 
 
+def _over_airspeed(laws: Sequence[Identity]) -> list[tuple[Identity, str]]:
+    return [(law, name) for law in laws for name in law.parts if name.endswith(OVER_AIRSPEED)]
+
+
+def _judge_units(laws: Sequence[Identity], means: Mapping[str, Array]) -> list[Finding]:
+    """Return the findings of an airspeed and a side force that another unit would suit better."""
+    by_speed = {1.0 / gain: unit for unit, gain in UNITS["mps"].items() if gain != 1.0}
+    # One in mg is proven; to read it so is to leave the side force out.
+    by_force = {UNITS["mps2"][unit]: unit for unit in ("g", "ft/s2")}
+    sides = [(law, "ay_mps2") for law in laws if "ay_mps2" in law.terms]
+    unlikely = unlikely_factors(means, (1.0, *by_force))
+    return [
+        *_likelier_unit("airspeed_mps", _over_airspeed(laws), by_speed, {}),
+        *_likelier_unit("ay_mps2", sides, by_force, unlikely),
+    ]
+
+
 def _likelier_unit(
-    name: str, shares: Sequence[tuple[Identity, str]], units: Mapping[float, str]
+    name: str,
+    shares: Sequence[tuple[Identity, str]],
+    units: Mapping[float, str],
+    unlikely: Mapping[float, float],
 ) -> list[Finding]:
     """Return the finding of a column that nothing proves wrong, but agrees better in another unit.
 
     Gusts may leave it open whether an airspeed is in m/s or in knots. That is no reading, but what
     the column scales is not to be trusted.
     """
-    likelier = likelier_factor(shares, units)
+    likelier = likelier_factor(shares, units, unlikely)
     if likelier is None:
         return []
     law, part = next((law, part) for law, part in shares if law.driven)
     check = CHECK_OF[law.name, part]
     text = f"{name} would agree better with what surfaces drive if it were in {units[likelier]}"
-    return [Finding(check, (name,), text, (f"its unit: {HINT}", "gusts"))]
+    causes = (f"its unit: {HINT}", "gusts", *(("an unusual side force",) if unlikely else ()))
+    return [Finding(check, (name,), text, causes)]
 
 
 def _factor_causes(f: Factor) -> tuple[str, ...]:

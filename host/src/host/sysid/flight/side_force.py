@@ -1,0 +1,46 @@
+"""How large side forces are beside lift: in which unit a side force is likely.
+
+Over the airspeed a side force turns sideslip by little, and delays of right sensors hide whether it
+is in g. Of the same swing in angle it is a tenth of lift: of a light aircraft 0.06, of airliners
+0.12 to 0.17, of a flying wing 0.02, of an aircraft with a large body 0.3 (published models). A unit
+is a factor of 9.8 or 3.3 away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from host.arrays import Array
+from host.sysid.flight.identity_factors import correlation
+
+USUAL_SHARE, SPREAD = 0.1, 0.7  # of lift; of its logarithm, one deviation
+LEAST_CORRELATION = 0.5  # of a force with its angle: with less the angle is not what makes it
+
+
+def unlikely_factors(means: Mapping[str, Array], tried: Iterable[float]) -> dict[float, float]:
+    """Return how many deviations squared a side force, so many times, is from what is usual.
+
+    Parameters
+    ----------
+    means : mapping
+        SI columns, means of short blocks.
+    tried : iterable of float
+        Factors of the side force. Where a force does not follow its angle none is unlikely.
+    """
+    side, lift = _slope(means, "ay_mps2", "beta_rad"), _slope(means, "az_mps2", "alpha_rad")
+    if side is None or lift is None:
+        return {}
+    share = side / lift / USUAL_SHARE
+    return {f: (float(np.log(f * share)) / SPREAD) ** 2 for f in tried}
+
+
+def _slope(means: Mapping[str, Array], force: str, angle: str) -> float | None:
+    """Return the size of a force over its angle, m/s2; None where they are not related."""
+    if force not in means or angle not in means:
+        return None
+    close = abs(correlation(means[angle], means[force]))
+    if close < LEAST_CORRELATION:
+        return None
+    return close * float(np.std(means[force]) / np.std(means[angle]))
