@@ -75,3 +75,21 @@ def compare_noise_models(
         warnings=(*result.warnings, warning),
         details=details,
     )
+
+
+def bayes_criterion(result: FitResult, maneuvers: Sequence[Maneuver]) -> float:
+    """Return the Bayesian information criterion of a fit, up to what all methods share.
+
+    Parameters
+    ----------
+    result : FitResult
+        Of output error or filter error.
+    maneuvers : sequence of Maneuver
+        What it was fitted to.
+    """
+    samples, outputs = sum(m.samples for m in maneuvers), len(result.model.outputs)
+    cost, count = float(np.asarray(result.details["cost"])), float(len(result.estimate))
+    if result.residual_kind == "output":  # its variances are concentrated out
+        cost += 0.5 * measurements(maneuvers)
+        count += outputs + float(np.sum(np.asarray(result.details["noise_orders"])))
+    return 2.0 * cost + count * float(np.log(samples))

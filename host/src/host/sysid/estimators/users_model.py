@@ -19,10 +19,11 @@ from host.sysid.estimators.filter_error_gust import SLOW_IN_CALM, fit_with_gust
 from host.sysid.estimators.gust_delays import advance_outputs
 from host.sysid.estimators.gust_model import VANES
 from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators.noise_model_comparison import bayes_criterion
 from host.sysid.estimators.output_error_fit import sample_periods
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
-from host.sysid.models.maneuver import Maneuver, measurements
+from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.intermittent_filter import needs_compiler
@@ -136,7 +137,7 @@ def fit_by_evidence(
         )
     except IdentificationError as error:
         return replace(plain, remarks=(f"{NOISE_CHOSEN}: {own}; gust: {error}",))
-    ahead = _criterion(plain.result, maneuvers) - _criterion(moving.result, maneuvers)
+    ahead = bayes_criterion(plain.result, maneuvers) - bayes_criterion(moving.result, maneuvers)
     chosen, name, other = (moving, "gust", own) if ahead > 0.0 else (plain, own, "gust")
     line = f"{NOISE_CHOSEN}: {name} (BIC {abs(ahead):.0f} below that of {other})"
     return replace(chosen, remarks=(line, *chosen.remarks))
@@ -236,13 +237,3 @@ def _converged(found: UsersFit) -> UsersFit:
         )
     result = replace(found.result, converged=True, warnings=())
     return replace(found, result=result)
-
-
-def _criterion(result: FitResult, maneuvers: Sequence[Maneuver]) -> float:
-    """Return the Bayesian information criterion, up to what all methods share."""
-    samples, outputs = sum(m.samples for m in maneuvers), len(result.model.outputs)
-    cost, count = float(np.asarray(result.details["cost"])), float(len(result.estimate))
-    if result.residual_kind == "output":  # its variances are concentrated out
-        cost += 0.5 * measurements(maneuvers)
-        count += outputs + float(np.sum(np.asarray(result.details["noise_orders"])))
-    return 2.0 * cost + count * float(np.log(samples))

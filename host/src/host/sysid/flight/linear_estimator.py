@@ -157,10 +157,23 @@ class LinearEstimator:
         spin = spin_of(self.powerplant, departing) if self.own is None else NO_SPIN
         delays: dict[str, tuple[float, float]] = {}
         fitted = beside = None
-        if gusty:
+        single = "output-error-white" if method == GUST and not gusty else method
+        single_start: dict[str, object] = (
+            {"multiple_starts": False} if single.startswith("output-error") else {}
+        )
+        options = {**single_start, **self.options}
+        if own is None and (gusty or single.startswith("output-error")):
+            beside = fit_beside_left_out(
+                single, model, data, departing, trim, self.airframe, spin, options,
+                by_evidence=self.method == DEFAULT_METHOD,
+            )  # fmt: skip
+        if beside is not None:
+            found, model, method = beside.result, beside.model, GUST if beside.in_gusts else method
+            data, delays = list(beside.maneuvers), beside.delays
+        elif gusty:
             staged, data, fitted = fit_gust_at_trim(model, data, cuts, trim, self.airframe, spin)
             found, model, delays = staged.result, staged.model, staged.delays
-        elif self.own is not None:
+        elif own is not None:
             speed = trim.airspeed_mps if trim.known else None
             by = (
                 fit_by_evidence(model, data, speed)
@@ -170,23 +183,11 @@ class LinearEstimator:
             found, method, delays, data = by.result, by.method, by.delays, list(by.maneuvers)
             model, remarks = found.model, (*remarks, *by.remarks)
         else:
-            single = "output-error-white" if method == GUST else method
-            single_start: dict[str, object] = (
-                {"multiple_starts": False} if single.startswith("output-error") else {}
-            )
-            options = {**single_start, **self.options}
-            if self.own is None and single.startswith("output-error"):
-                beside = fit_beside_left_out(
-                    single, model, data, departing, trim, self.airframe, spin, options
-                )
-            if beside is None:
-                fitted = remove_departures(data, departures)
-                found = fit(single, model, fitted, **options)
-                both = list(zip(found.fitted, departures, strict=True))
-                if all(y.shape == gone.shape for y, gone in both):  # of frequencies they are others
-                    found = replace(found, fitted=tuple(y + gone for y, gone in both))
-            else:
-                found = beside.result
+            fitted = remove_departures(data, departures)
+            found = fit(single, model, fitted, **options)
+            both = list(zip(found.fitted, departures, strict=True))
+            if all(y.shape == gone.shape for y, gone in both):  # of frequencies they are others
+                found = replace(found, fitted=tuple(y + gone for y, gone in both))
         # The start of a gust filter that was lost may have run away: M_alpha -57 000 of one point.
         refuse_unless_finite(found, found.method)
         found = found if servo is None else servo.added_to(found)

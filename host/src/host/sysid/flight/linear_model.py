@@ -49,7 +49,7 @@ STILL_RAD = 1e-9  # a surface that moves less stands still but for rounding
 UNTIED = ("equation-error-total", "recursive", "neural-delta")
 STAGED = {
     "flight": "gust filter where alpha is a measured state; beta too, of our log only with an"
-    " aircraft file (default)",
+    " aircraft file, of dutch-roll where the data show gusts (default)",
     GUST: "filter error with the gust as a state, delays estimated beside it",
 }
 

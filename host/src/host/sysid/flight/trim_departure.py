@@ -130,6 +130,10 @@ class Departure:
             delays=base.delays,
         )
 
+    def expecting(self, result: FitResult) -> Departure:
+        """Return the same with what another fit of the template says of the size of the terms."""
+        return replace(self, beside=_left_out(result, self.varying.left_out))
+
     def of_fit(self, wide: FitResult, length: int) -> Departure:
         """Return the departures as a fit of `wide_model` has them: nothing is left to be moved.
 
