@@ -123,6 +123,8 @@ def test_a_side_force_unlike_that_of_any_aircraft_is_in_doubt(unit: float, seed:
     told = check(right | {"ay_mps2": right["ay_mps2"] / unit})
     assert [f.check for f in told] == ["beta-against-ay"]
     assert "ay_mps2" in told[0].channels
+    assert told[0].done == "used as it is, but by no linear answer"
+    assert told[0].accept().done == "accepted, used as it is"
 
 
 def test_a_force_that_follows_no_angle_is_not_judged_by_its_size() -> None:

@@ -49,11 +49,7 @@ def compare_noise_models(
     except IdentificationError:
         return result
     orders = np.asarray(alternative.details["noise_orders"])
-    rows, outputs = sum(m.samples for m in maneuvers), len(result.model.outputs)
-    likelihood = float(alternative.details["cost"]) + 0.5 * measurements(maneuvers)
-    parameters = len(alternative.estimate) + outputs + float(np.sum(orders))
-    excess = 2.0 * (float(result.details["cost"]) - likelihood)
-    excess += float(np.log(rows)) * (len(result.estimate) - parameters)
+    excess = bayes_criterion(result, maneuvers) - bayes_criterion(alternative, maneuvers)
     details = {**result.details, "bic_over_coloured_noise": excess}
     if not alternative.converged or excess < DECISIVE or not np.any(orders):
         return replace(result, details=details)

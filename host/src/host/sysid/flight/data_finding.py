@@ -123,7 +123,7 @@ class Finding:
 
     def accept(self) -> Finding:
         """Return the finding as the user accepted it: what it left out is used as it is."""
-        used = self.closed or self.done == AS_IT_IS
+        used = self.closed or self.done.startswith(AS_IT_IS)
         done = AS_IT_IS if used else f"which overrides nothing: {self.done}"
         return replace(self, accepted=True, closed=False, done=f"accepted, {done}")
 

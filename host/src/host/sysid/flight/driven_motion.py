@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 from scipy.special import chdtri
@@ -191,7 +190,7 @@ def shared_factor(shares: Sequence[tuple[Identity, str]], tried: Iterable[float]
 def likelier_factor(
     shares: Sequence[tuple[Identity, str]],
     tried: Collection[float],
-    unlikely: Mapping[float, float] = MappingProxyType({}),
+    unlikely: Mapping[float, float],
 ) -> float | None:
     """Return the factor with which parts of several identities agree better than as they are.
 
@@ -202,7 +201,7 @@ def likelier_factor(
     shares, tried
         As `shared_factor`.
     unlikely : mapping
-        How many deviations squared a factor is from what is usual, where that is known.
+        How many deviations squared a factor is from what is usual; empty where nobody knows.
     """
     tests = [(DrivenTest(law), name) for law, name in shares if law.driven and testable(law)]
     if not tests:

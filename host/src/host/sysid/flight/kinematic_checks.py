@@ -18,7 +18,7 @@ import numpy as np
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.sysid.flight.column_map import UNITS
-from host.sysid.flight.data_finding import HINT, Finding
+from host.sysid.flight.data_finding import AS_IT_IS, HINT, Finding
 from host.sysid.flight.driven_motion import (
     DrivenFactor,
     driven_factors,
@@ -271,7 +271,8 @@ def _likelier_unit(
     check = CHECK_OF[law.name, part]
     text = f"{name} would agree better with what surfaces drive if it were in {units[likelier]}"
     causes = (f"its unit: {HINT}", "gusts", *(("an unusual side force",) if unlikely else ()))
-    return [Finding(check, (name,), text, causes)]
+    done = f"{AS_IT_IS}, but by no linear answer" if name == "ay_mps2" else AS_IT_IS
+    return [Finding(check, (name,), text, causes, done)]
 
 
 def _factor_causes(f: Factor) -> tuple[str, ...]:
