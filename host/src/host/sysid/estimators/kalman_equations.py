@@ -218,9 +218,10 @@ def _passed(
     )
     if not finite(
         model.source.code.loop(filter_equations), z, P, lower, upper, intensity, variance,
-        given.inputs, maneuver.outputs, maneuver.seen, given.parameters, layout.column,
-        problem.constants, problem.tables, np.zeros(n), layout.bias, np.zeros(len(late)),
-        layout.offset, np.zeros(len(late)), layout.delay, leader, layout.input_delay,
+        given.inputs, given.held, given.shift, maneuver.outputs, maneuver.seen,
+        given.parameters, layout.column, problem.constants, problem.tables,
+        np.zeros(n), layout.bias, np.zeros(len(late)), layout.offset,
+        np.zeros(len(late)), layout.delay, leader, layout.input_delay,
         maneuver.dt_s, problem.substeps, problem.ramp, e, white, power,
     ) or not np.isfinite(z).all():  # fmt: skip
         raise IdentificationError(

@@ -156,6 +156,7 @@ def _restarted_equations(
     problem = NonlinearProblem(replace(model, delays=()), [maneuver])
     problem.choose_step(problem.first_guess())
     ramp = 1.0 if model.hold == "foh" else 0.0
+    no_delay = np.zeros(len(model.inputs))
     result = np.full((len(starts), steps, len(model.outputs)), np.nan)
     for number, k in enumerate(starts.tolist()):
         x, added = free[k].copy(), np.zeros(len(model.outputs))
@@ -174,8 +175,8 @@ def _restarted_equations(
         u = np.ascontiguousarray(maneuver.inputs[k : k + steps + 1])
         states, y = np.empty((steps + 1, len(x))), np.empty((steps + 1, len(model.outputs)))
         if finite(
-            simulated, x, u, p, e.constant_values, e.table_values, bias.rate, maneuver.dt_s,
-            problem.substeps, ramp, states, y,
+            simulated, x, u, u, no_delay, p, e.constant_values, e.table_values, bias.rate,
+            maneuver.dt_s, problem.substeps, ramp, states, y,
         ):  # fmt: skip
             result[number] = y[1:] + bias.output
     return result

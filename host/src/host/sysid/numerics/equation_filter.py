@@ -15,10 +15,13 @@ from host.compiled import compiled_part
 from host.sysid.expressions.equation_code import of_equations
 from host.sysid.numerics.equation_recursion import (
     STATE_LIMIT,
+    add_jumps,
+    end_of_step,
     multiply,
     rate_slopes,
     rates,
     reading_slopes,
+    take_held,
 )
 from host.sysid.numerics.fractional_delay import delayed_at
 
@@ -248,6 +251,8 @@ def filter_equations(
     intensity: Array,
     variance: Array,
     inputs: Array,
+    held: Array,
+    late: Array,
     measured: Array,
     seen: BoolArray,
     p: Array,
@@ -282,7 +287,8 @@ def filter_equations(
         Spectral density of the noise in each rate.
     variance : Array, shape (outputs,)
         Of the measurement noise.
-    inputs : Array, shape (samples, m)
+    inputs, held, late
+        As `inputs`, `held` and `shift` of `simulate_equations`.
     measured, seen : Array, shape (samples, outputs)
         What was measured, and whether.
     p, c, t : Array
@@ -314,7 +320,7 @@ def filter_equations(
     """
     n, L, m, outputs, q = len(bias), len(z), inputs.shape[1], measured.shape[1], len(column)
     p, bias, offset, delay_s = p.copy(), bias.copy(), offset.copy(), delay_s.copy()
-    u, by_shift, shift = np.zeros((3, m)), np.zeros((3, m)), np.zeros(m)
+    u, by_shift, shift = np.zeros((3, m)), np.zeros((3, m)), late.copy()
     back, work, half = np.zeros(n), np.zeros((3, n)), np.zeros(n)
     fx, fu, fp = np.zeros((n, n)), np.zeros((n, m)), np.zeros((n, q))
     y, yx = np.zeros(outputs), np.zeros((outputs, n))
@@ -322,7 +328,6 @@ def filter_equations(
     S, B, E, G = np.zeros((n, L)), np.zeros((n, L)), np.zeros((n, L)), np.zeros((n, L))
     reached, H = np.zeros((outputs, L)), np.zeros((outputs, L))
     change, PH = np.zeros(L), np.zeros(L)
-    h = dt_s / substeps
     for k in range(len(inputs)):
         for i in range(n):
             if not abs(z[i]) < STATE_LIMIT:
@@ -336,18 +341,18 @@ def filter_equations(
         for j in range(outputs):
             if leader[j] != j:
                 continue
-            late = delay_s[j]
+            ago_s = delay_s[j]
             for i in range(n):
                 back[i] = z[i]
-            if late != 0.0 or delay_column[j] >= 0:
-                # What is measured now was true `late` ago: one step back along the equations.
+            if ago_s != 0.0 or delay_column[j] >= 0:
+                # What is measured now was true `ago_s` ago: one step back along the equations.
                 for part in range(3):
                     input_at(
-                        inputs, k - 0.5 * part * late / dt_s, shift, input_column, ramp, u[part],
+                        inputs, k - 0.5 * part * ago_s / dt_s, shift, input_column, ramp, u[part],
                         by_shift[part],
                     )  # fmt: skip
                 step_along(
-                    back, -late, u, by_shift[1] / dt_s, p, c, t, bias, column, bias_column,
+                    back, -ago_s, u, by_shift[1] / dt_s, p, c, t, bias, column, bias_column,
                     input_column, work, fx, fu, fp, B, E, S,
                 )  # fmt: skip
                 if delay_column[j] >= 0:
@@ -357,13 +362,13 @@ def filter_equations(
                 S[:, :] = 0.0
                 for i in range(n):
                     S[i, i] = 1.0
-            input_at(inputs, k - late / dt_s, shift, input_column, ramp, u[2], by_shift[2])
+            input_at(inputs, k - ago_s / dt_s, shift, input_column, ramp, u[2], by_shift[2])
             reading_slopes(back, u[2], p, c, t, y, yx, yu, yp)
             multiply(yx, S, reached)
             if delay_column[j] >= 0:
                 # An output that an input drives at once sees that input later too.
                 input_rate(
-                    inputs, k - late / dt_s, shift, input_column, ramp, u[0], u[1], by_shift[0]
+                    inputs, k - ago_s / dt_s, shift, input_column, ramp, u[0], u[1], by_shift[0]
                 )
                 for i in range(outputs):
                     for b in range(m):
@@ -391,15 +396,27 @@ def filter_equations(
         take_unknowns(z, column, p)
         take_unknowns(z, bias_column, bias)
         take_unknowns(z / dt_s, input_column, shift)
-        for s in range(substeps):
+        position, whole = 0.0, 0
+        while whole < substeps:
+            boundary = (whole + 1.0) / substeps
+            end = end_of_step(position, boundary, shift, ramp)
             for part in range(3):
-                input_within(
-                    inputs, k, (s + 0.5 * part) / substeps, shift, input_column, ramp, u[part],
-                    by_shift[part],
-                )  # fmt: skip
+                if ramp == 0.0:
+                    take_held(held, k + 0.5 * (position + end), shift, u[part])
+                    by_shift[part] = 0.0
+                else:
+                    share = position + 0.5 * part * (end - position)
+                    input_within(
+                        inputs, k, share, shift, input_column, ramp, u[part], by_shift[part]
+                    )
             step_along(
-                z, h, u, by_shift[1] / dt_s, p, c, t, bias, column, bias_column, input_column,
-                work, fx, fu, fp, B, E, S,
+                z, (end - position) * dt_s, u, by_shift[1] / dt_s, p, c, t, bias, column,
+                bias_column, input_column, work, fx, fu, fp, B, E, S,
             )  # fmt: skip
-            spread_ahead(P, S, fx, intensity, h, G, half)
+            if ramp == 0.0:
+                add_jumps(z[:n], k + end, held, shift, input_column, p, c, t, S, work[:2], u[:2])
+            spread_ahead(P, S, fx, intensity, (end - position) * dt_s, G, half)
+            position = end
+            if end == boundary:
+                whole += 1
     return True

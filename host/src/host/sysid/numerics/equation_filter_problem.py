@@ -194,10 +194,10 @@ class EquationFilterProblem:
         no_limit = np.full(n, np.inf)
         if not finite(
             self._run, g.start.copy(), self._first_covariance(g, intensity), -no_limit, no_limit,
-            intensity, variance, g.inputs, maneuver.outputs, maneuver.seen, g.parameters,
-            np.full(len(g.parameters), -1, dtype=np.int64), problem.constants, problem.tables,
-            g.bias, none[:n], problem.output_offsets(g.local), none[:outputs], delay_s,
-            none[:outputs], self._leader, none[:inputs], maneuver.dt_s,
+            intensity, variance, g.inputs, g.held, g.shift, maneuver.outputs, maneuver.seen,
+            g.parameters, np.full(len(g.parameters), -1, dtype=np.int64), problem.constants,
+            problem.tables, g.bias, none[:n], problem.output_offsets(g.local), none[:outputs],
+            delay_s, none[:outputs], self._leader, none[:inputs], maneuver.dt_s,
             self._substeps(maneuver.dt_s), problem.ramp, e, white, power,
         ):  # fmt: skip
             return None

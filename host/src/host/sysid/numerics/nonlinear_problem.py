@@ -29,7 +29,9 @@ class Given:
 
     local: Array  # unknowns of the maneuver, a zero behind
     start: Array
-    inputs: Array
+    inputs: Array  # as late as they are
+    held: Array  # not yet late, and by how many samples they are where they are held
+    shift: Array
     input_slopes: Array  # by their delay
     parameters: Array
     bias: Array
@@ -137,9 +139,10 @@ class NonlinearProblem(OutputProblem):
             x, y = np.empty((samples, n)), np.empty((samples, len(self.model.outputs)))
             slope = self._memory_for(number, (len(self.model.outputs), samples, self._width))
             if not finite(
-                self._with_slopes, g.start, self._start_slopes, g.inputs, g.input_slopes,
-                self.input_column, g.parameters, self.column, self.constants, self.tables,
-                g.bias, self.bias_column, part.dt_s, self.substeps, self.ramp, x, y, slope,
+                self._with_slopes, g.start, self._start_slopes, g.inputs, g.held, g.shift,
+                g.input_slopes, self.input_column, g.parameters, self.column, self.constants,
+                self.tables, g.bias, self.bias_column, part.dt_s, self.substeps, self.ramp,
+                x, y, slope,
             ):  # fmt: skip
                 return None
             out = self._with_biases(y, g.local)
@@ -181,8 +184,8 @@ class NonlinearProblem(OutputProblem):
             x = np.empty((len(g.inputs), len(self.model.states)))
             y = np.empty((len(g.inputs), len(self.model.outputs)))
             if not finite(
-                self._simulate, g.start, g.inputs, g.parameters, self.constants, self.tables,
-                g.bias, part.dt_s, substeps, ramp, x, y,
+                self._simulate, g.start, g.inputs, g.held, g.shift, g.parameters, self.constants,
+                self.tables, g.bias, part.dt_s, substeps, ramp, x, y,
             ):  # fmt: skip
                 return None
             out = self._with_biases(y, g.local)
@@ -204,19 +207,22 @@ class NonlinearProblem(OutputProblem):
         """Return the arguments of the simulation of one maneuver at a parameter vector."""
         part = self._parts[number]
         local = np.append(theta[part.index], 0.0)  # an index of -1 reads the last
-        inputs = self.maneuvers[number].inputs
-        slopes = np.zeros_like(inputs)
+        held = inputs = np.ascontiguousarray(self.maneuvers[number].inputs)
+        slopes, shifts = np.zeros_like(inputs), np.zeros(inputs.shape[1])
         if (self.input_column >= 0).any():
             inputs = inputs.copy()
             for j in np.flatnonzero(self.input_column >= 0):
                 shift = local[self.input_column[j]] / part.dt_s
-                at_once = inputs[:, [j]]
+                shifts[j] = shift if self.ramp == 0.0 else 0.0
+                at_once = held[:, [j]]
                 inputs[:, j] = delay_columns(at_once, shift)[:, 0]
                 slopes[:, j] = slope_by_delay(at_once, shift)[:, 0] / part.dt_s
         return Given(
             local=local,
             start=self._known_start + local[self._start_parameter],
-            inputs=np.ascontiguousarray(inputs),
+            inputs=inputs,
+            held=held,
+            shift=shifts,
             input_slopes=slopes,
             parameters=self.nonlinear.parameter_vector(theta, local[self.first_own : -1]),
             bias=local[self.bias_column],
