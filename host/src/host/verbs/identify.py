@@ -123,6 +123,7 @@ def _run(args: argparse.Namespace) -> int:
     from host.sysid.answer.output_files import check_outputs
     from host.sysid.estimators.method_options import read_options
     from host.sysid.pipeline.arguments import option_words
+    from host.sysid.pipeline.requested_models import requested_methods
     from host.sysid.pipeline.stages import identify
 
     if lines := _asked_for(args):
@@ -130,7 +131,7 @@ def _run(args: argparse.Namespace) -> int:
         return int(ExitCode.OK)
     args.source = args.source or [source_or_newest(None)]
     places = _places(args)
-    check_outputs(places)
+    check_outputs(places, requested_methods(args.method))
     found = identify(
         args.source,
         aircraft=args.aircraft,

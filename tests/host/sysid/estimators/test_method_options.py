@@ -167,6 +167,14 @@ def test_a_method_that_does_not_settle_has_no_history(
     assert identified(table, "equation-error", "--history", str(path)) == 2
     assert "no method here notes how it settles" in capsys.readouterr().err
     assert not path.exists()
+    # Said before the work: this table is not even there.
+    gone, options = (
+        str(tmp_path / "gone.csv"),
+        ("--method", "equation-error", "--method", "genetic"),
+    )
+    assert main(["identify", gone, *options, "--history", str(path)]) == 2
+    said = capsys.readouterr().err
+    assert "--history" in said and "no method here notes how it settles" in said
 
 
 def test_the_answer_says_since_when_it_settled(

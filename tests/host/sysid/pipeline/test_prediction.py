@@ -318,6 +318,8 @@ def test_derivatives_that_nobody_estimated_are_said(tmp_path: Path) -> None:
     path.write_text(text + 'A = [["M_q"]]\nB = [["M_de"]]\n[parameters]\nM_q = -9.0\n')
     found = host.predict(path, recorded(2))
     assert "held at zero, for mine.toml gives no start of them: M_de" in found.to_text()
+    path.write_text(path.read_text() + "M_de = 0.0\n")
+    assert "gives no start" not in host.predict(path, recorded(2)).to_text()
 
 
 def test_files_in_the_wrong_order_or_empty_are_one_line(

@@ -131,8 +131,13 @@ def _participating(answer: Answer, mode: Mode, states: Sequence[str]) -> list[st
 def _mode_line(mode: Mode) -> str:
     half = mode.frequency_half_width_radps
     if not mode.oscillatory:
-        return f"  {mode.name}: {mode.eigenvalue.real:.3f} +- {half:.3f} 1/s"
+        return f"  {mode.name}: {mode.eigenvalue.real:.3f} +- {_width(half)} 1/s"
     return (
-        f"  {mode.name}: {mode.frequency_radps:.3f} +- {half:.3f} rad/s,"
-        f" damping {mode.damping:.3f} +- {mode.damping_half_width:.3f}"
+        f"  {mode.name}: {mode.frequency_radps:.3f} +- {_width(half)} rad/s,"
+        f" damping {mode.damping:.3f} +- {_width(mode.damping_half_width)}"
     )
+
+
+def _width(half: float) -> str:
+    """Return a half-width with three decimals, or as many as it takes to be none of zero."""
+    return f"{half:.3f}" if half >= 0.001 else f"{half:.1g}"

@@ -15,6 +15,7 @@ from host.sysid.answer.atomic_files import atomic_write, check_destination, file
 from host.sysid.answer.mat_file import labels, write_mat
 from host.sysid.answer.settling_history import has_history, write_history
 from host.sysid.answer.simulators.forms import CONTROL, FORMS, files_of, form_of, write_form
+from host.sysid.estimators.method_options import SETTLING
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.identification_error import IdentificationError
 
@@ -60,15 +61,24 @@ class OutputPaths:
         return {name: path for name, path in asked.items() if path is not None}
 
 
-def check_outputs(places: OutputPaths) -> None:
+def check_outputs(places: OutputPaths, methods: Sequence[str] = SETTLING) -> None:
     """Refuse what cannot be written while it costs nothing: before the flight is read.
+
+    Parameters
+    ----------
+    places : OutputPaths
+    methods : sequence of str
+        That are asked for.
 
     Raises
     ------
     IdentificationError
         A place that is none, an ending that says nothing, a file that would replace its own
-        source, an aircraft without what it is made of, pictures without matplotlib.
+        source, an aircraft without what it is made of, a history by methods that note none,
+        pictures without matplotlib.
     """
+    if places.history is not None and not {*SETTLING} & {*methods}:
+        raise _no_history(places.history)
     taken: dict[Path, str] = {}
     for name, path in places.files.items():
         known, argument = ENDINGS[name], f"argument {name}"
@@ -193,10 +203,7 @@ def _write_models(path: Path, answers: Sequence[Answer], kept: Sequence[Path]) -
 def _write_histories(path: Path, answers: Sequence[Answer], kept: Sequence[Path]) -> list[Path]:
     settled = [a for a in answers if has_history(a)]
     if not settled:
-        raise IdentificationError(
-            f"argument history {path}: no method here notes how it settles; hopfield,"
-            " hopfield-line-search, hopfield-whitened, recursive and recursive-fourier do"
-        )
+        raise _no_history(path)
     named = _named("history", path, settled, kept)
     for own, answer in named.items():
         write_history(own, answer)
@@ -222,3 +229,9 @@ def _named(
             )
         named[own] = answer
     return named
+
+
+def _no_history(path: Path) -> IdentificationError:
+    return IdentificationError(
+        f"argument history {path}: no method here notes how it settles; {', '.join(SETTLING)} do"
+    )

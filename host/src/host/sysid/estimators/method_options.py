@@ -19,6 +19,10 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "hopfield-whitened": ("iterations", "start"),
     "recursive": ("forgetting",),
 }
+# Methods that note how an estimate settles.
+SETTLING = (
+    "hopfield", "hopfield-line-search", "hopfield-whitened", "recursive", "recursive-fourier",
+)  # fmt: skip
 _SIZE = Quantity("", -1e12, 1e12, "the thesis has -200 to 200")
 _GAIN = Quantity("", 0.0, 1e6, "the thesis has 1e-3, its program 1e-5", above=True)
 _COUNT = Quantity("", 1.0, 1e8, "the thesis has 200 000")

@@ -179,9 +179,18 @@ def _saved_models(path: Path) -> tuple[list[tuple[str, LinearModel]], list[str]]
             " `host identify --save-model` writes them"
         )
     own = read_model(path)
-    zero = ", ".join(p.name for p in own.parameters if p.start == 0.0)
-    doubts = [f"held at zero, for {path.name} gives no start of them: {zero}"] if zero else []
+    zero = _without_start(read_document(path), own)
+    names = ", ".join(zero)
+    doubts = [f"held at zero, for {path.name} gives no start of them: {names}"] if zero else []
     return [(own.name, replace(frozen_at(own, own.start), delays=()))], doubts
+
+
+def _without_start(document: Mapping[str, object], model: LinearModel) -> list[str]:
+    """Return the parameters that are zero because a file says nothing else."""
+    given = document.get("parameters")
+    stated = given if isinstance(given, dict) else {}
+    said = {n for n, v in stated.items() if not isinstance(v, dict) or "start" in v}
+    return [p.name for p in model.parameters if p.start == 0.0 and p.name not in said]
 
 
 def _late_inputs(path: Path) -> dict[str, float]:
