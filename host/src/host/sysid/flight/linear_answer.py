@@ -26,7 +26,7 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.residual_delays import STANDARD_DELAYS
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.state_space_model import DelayGroup, LinearModel
 from host.sysid.models.templates import Trim
 from host.sysid.numerics.input_coherence import InputCoherence
 
@@ -61,6 +61,7 @@ class Answer:
     explained: dict[str, Prediction] = field(default_factory=dict)  # of outputs fitted, in gusts
     noise_covariance: Array | None = None  # of the estimate, without systematic errors
     coefficient_parts: CoefficientParts | None = None
+    standard_delays: tuple[DelayGroup, ...] = STANDARD_DELAYS  # that its sensors may have
     left_out: tuple[str, ...] = ()  # motion beside a reduced template that nothing accounts for
     causes: dict[str, str] = field(default_factory=dict)  # what widens each interval most
     held_out_runs: tuple[
@@ -70,7 +71,7 @@ class Answer:
     @property
     def at_bound(self) -> tuple[str, ...]:
         """Delays that the search wanted larger than a sensor can be late."""
-        limits = {d.name: d.limit_s for d in (*STANDARD_DELAYS, *self.model.delays)}
+        limits = {d.name: d.limit_s for d in (*self.standard_delays, *self.model.delays)}
         values = {name: value for name, (value, _) in self.delays.items()}
         values |= {
             d.name: self.result.value(d.name)

@@ -47,6 +47,7 @@ from host.sysid.flight.linear_model import (
     DEFAULT_METHOD,
     GUST,
     model_and_method,
+    standard_delays,
 )
 from host.sysid.flight.linear_stages import LinearEstimate, LinearIntervals, LinearValidation
 from host.sysid.flight.linear_validation import linear_validation
@@ -282,6 +283,7 @@ class LinearEstimator:
             held_out_runs=validation.held_out_runs,
             noise_covariance=statistical.covariance,
             left_out=e.left_out,
+            standard_delays=standard_delays(e.used),
             causes=widest_errors(e.fit, intervals.statistical, intervals.total, intervals.shifts),
         )
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from host.instrument.deviations import SensorErrorModel, deviations, unknown_sensors
+from host.instrument.recording import OWN
 from host.sysid.compatibility.path_preparation import NO_OFFSETS
 from host.sysid.estimators.start_values import regression_estimates
 from host.sysid.flight.filter_step import (
@@ -18,8 +19,14 @@ from host.sysid.flight.filter_step import (
 from host.sysid.flight.hidden_angles import without_vanes
 from host.sysid.flight.reconstructed_flight import FlownManeuver
 from host.sysid.identification_error import IdentificationError
-from host.sysid.models.residual_delays import STANDARD_DELAYS, without_standard_delays
+from host.sysid.models.rate_forces import with_rate_forces
+from host.sysid.models.residual_delays import (
+    OTHERS_DELAYS,
+    STANDARD_DELAYS,
+    without_standard_delays,
+)
 from host.sysid.models.state_space_model import (
+    DelayGroup,
     LinearModel,
     without_inputs,
     without_outputs,
@@ -135,8 +142,20 @@ def _default_method(
     return ("output-error-white", f"{why}; output error stands instead") if why else (GUST, "")
 
 
+def standard_delays(used: Sequence[FlownManeuver]) -> tuple[DelayGroup, ...]:
+    """Return the delays that sensors may have: of our logger's, or of others'."""
+    ours = all(m.flight.maker == OWN for m in used)
+    return STANDARD_DELAYS if ours else OTHERS_DELAYS
+
+
 def template_at(
-    columns: Collection[str], name: str, trim: Trim, method: str, *, able: bool
+    columns: Collection[str],
+    name: str,
+    trim: Trim,
+    method: str,
+    delays: Sequence[DelayGroup],
+    *,
+    able: bool,
 ) -> LinearModel:
     """Return a template about a trim; `able` frees delays and the places of accelerometers."""
     if name not in TEMPLATES:
@@ -146,9 +165,11 @@ def template_at(
         name,
         trim,
         accelerometers=method not in UNTIED and trim.known and across in columns,
-        delays=STANDARD_DELAYS if able else (),
+        delays=tuple(delays) if able else (),
         imu_sd_m=imu_place_m(unknown_sensors()) if able else 0.0,
     )
+    if across not in found.outputs and frees_places(method):
+        found = with_rate_forces(found)
     return found if "ax_mps2" in columns else without_outputs(found, ("ax_mps2",))
 
 
@@ -165,7 +186,9 @@ def fitted_template(
 
     A flying wing has no rudder, and a surface that stood still says nothing.
     """
-    model, remarks = without_vanes(template_at(columns, name, trim, method, able=able), columns)
+    delays = standard_delays(used)
+    whole = template_at(columns, name, trim, method, delays, able=able)
+    model, remarks = without_vanes(whole, columns)
     remarks += () if trim.known else (NO_AIRSPEED,)
     absent = [u for u in model.inputs if u not in columns]
     still = [

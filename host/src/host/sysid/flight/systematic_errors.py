@@ -29,6 +29,7 @@ from host.sysid.flight.one_step import one_step_of
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.rate_forces import by_prior, with_rate_forces
 from host.sysid.models.state_space_model import LinearModel, without_outputs
 from host.sysid.models.templates import TEMPLATES, Trim, template
 from host.sysid.numerics.nonlinear_problem import output_problem
@@ -256,6 +257,7 @@ def _about(model: LinearModel, trim: Trim) -> LinearModel:
     """Return the template of a model's name at another trim, without lever arms."""
     forces = any(y.startswith("a") and y.endswith("_mps2") for y in model.outputs)
     fresh = template(model.name, trim, accelerometers=forces)
+    fresh = with_rate_forces(fresh) if by_prior(model) else fresh
     return without_outputs(fresh, [y for y in fresh.outputs if y not in model.outputs])
 
 

@@ -48,6 +48,7 @@ from host.sysid.flight.one_step import CERTAIN_SD, HALF_WAY, OneStep, one_step_o
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.rate_forces import has_rate_forces
 from host.sysid.models.state_space_model import LinearModel, Parameter
 from host.sysid.models.templates import Trim
 from host.sysid.numerics.output_error_problem import OutputProblem
@@ -273,9 +274,10 @@ def correct_trim_departure(
         return None
     thrust = thrust_terms(base, cuts, trim, airframe)
     varying = VaryingModel(base, base.name, trim, airframe, spin, left_out, thrust)
-    # Without accelerometers the lift of pitching passes for a scale of alpha: nothing is guessed.
+    # Without accelerometers the lift of pitching passes for a scale of alpha: nothing is guessed
+    # where the model has none.
     guessed = assumed and not left_out
-    if guessed and not varying.forces:
+    if guessed and not varying.forces and not has_rate_forces(base):
         return None
     beside = _left_out(result, (*left_out, *thrust))
     expected = {t.name: beside[t.name][0] for t in thrust}
