@@ -39,6 +39,10 @@ SHORTEST_SHARE = 0.2  # of a sample: least delay that is left of a vane's, set b
 # in calm air, where 0.2 ms counted in full made its interval 1.6 times as wide): of them only
 # gusts count it.
 HOLD_SHARE = 0.02
+# The same of a vane against them: what gusts do between samples. 0.1 to 0.2 ms were found in
+# Dryden's air and 0.3 to 0.5 in von Karman's of a vane without any, known to 0.17 at 10 ms (4 and
+# 8 flights of 1 m/s); M_alpha was 1.0 % large by half of it, known to 1.2 to 1.4.
+VANE_SHARE = 0.03
 CALM_MPS = 0.1  # deviation of gusts, well below which they pass for nothing
 SETTLED_SD = 0.3  # a round that moves a delay by less is the last
 # The pitot feels gusts along the path that the model has not: its delay went to 50 ms.
@@ -125,12 +129,17 @@ def estimate_delays(
         delays = {d.name: (0.0, float(half[first.index(d.name)])) for d in groups}
         return DelayEstimate(delays, estimate, _added_covariance(first, list(values), count))
     found = _known_no_better(found, vanes, np.inf if by_prior else GUST_FORM)
-    steps_s = {d.name: sampling_step_s(d, model, maneuvers) for d in groups}
-    widened = _with_hold_error(found, groups, {n: HOLD_SHARE * s for n, s in steps_s.items()})
-    half = NORMAL_95 * widened.standard_error
     gust_mps = gust_deviation_mps(found, airspeed_mps)
-    share = HOLD_SHARE * gust_mps / float(np.hypot(gust_mps, CALM_MPS))
-    counted = _with_hold_error(found, groups, {n: share * s for n, s in steps_s.items()})
+    by_gusts = gust_mps / float(np.hypot(gust_mps, CALM_MPS))
+    passing_s = {
+        d.name: (by_gusts * VANE_SHARE if _late_by_pade(d) else HOLD_SHARE)
+        * sampling_step_s(d, model, maneuvers)
+        for d in groups
+    }
+    widened = _with_hold_error(found, groups, passing_s)
+    half = NORMAL_95 * widened.standard_error
+    less_s = {d.name: passing_s[d.name] * (1.0 if _late_by_pade(d) else by_gusts) for d in groups}
+    counted = _with_hold_error(found, groups, less_s)
     return DelayEstimate(
         {n: (v, float(half[widened.index(n)])) for n, v in values.items()},
         estimate,
@@ -316,14 +325,11 @@ def _as_delays(found: FitResult, groups: Sequence[DelayGroup], dt_s: float) -> F
 def _with_hold_error(
     found: FitResult, groups: Sequence[DelayGroup], sd_s: Mapping[str, float]
 ) -> FitResult:
-    """Return the fit with what passes for a delay of the inertial sensors, parameters moving along.
-
-    Vanes are compared with them: what shifts both is no delay between.
-    """
+    """Return the fit with what else passes for a delay, one deviation, parameters moving along."""
     covariance = found.covariance.copy()
     for delay in groups:
         k = found.index(delay.name)
-        if not _late_by_pade(delay) and covariance[k, k] > 0.0:
+        if covariance[k, k] > 0.0:
             by = covariance[:, k] / covariance[k, k]
             covariance += sd_s[delay.name] ** 2 * np.outer(by, by)
     return replace(found, covariance=covariance)
