@@ -138,6 +138,32 @@ def test_guidance_onto_a_line_is_named_where_heading_is_no_column(seed: int) -> 
     assert found.text.endswith(", about a command that changes slowly, heading by rates")
 
 
+def noisier(columns: Columns, seed: int, rate_dps: float, *names: str) -> Columns:
+    """Return columns whose gyros have noise that the law, with gyros of its own, has not."""
+    rng = np.random.default_rng(seed)
+    noise = {n: np.radians(rate_dps) * rng.standard_normal(len(columns[n])) for n in names}
+    return columns | {n: columns[n] + added for n, added in noise.items()}
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_damper_is_named_where_gyros_are_as_noisy_as_the_aircraft_turns(seed: int) -> None:
+    """It was silent: the noise of the gyro, which is no input, was half of what the law left."""
+    quiet = lateral(DAMPER, seed)
+    [found] = found_in(
+        noisier(quiet, seed, 57.3 * float(np.std(quiet["r_radps"])) / 1.5, "r_radps")
+    )
+    assert int(found.text.split(" ms")[0].split()[-1]) == pytest.approx(40, abs=15)
+    assert found.feedback is not None
+    assert found.feedback.signals == ("r_radps",)
+    assert found.feedback.gains[0] == pytest.approx(0.4, abs=0.04)  # noise made it smaller
+
+
+def test_noise_of_gyros_makes_no_law_of_a_pilots_inputs() -> None:
+    for seed in (3, 4, 5, 6):
+        columns = noisier(lateral(None, seed), seed, 1.0, "p_radps", "r_radps")
+        assert found_in(columns) == []
+
+
 @pytest.mark.parametrize(("seed", "leg_s"), [(19500, 12.0), (19502, 12.0), (19500, 4.0)])
 def test_a_tracker_is_named_where_heading_is_no_column(seed: int, leg_s: float) -> None:
     """The rates tell it, but for a drift; without them bank alone is no law.

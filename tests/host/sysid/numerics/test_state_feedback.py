@@ -42,3 +42,23 @@ def test_a_lag_and_a_wash_out_behind_each_other_are_found(
     assert law.signals == ("q",)
     found = (law.gains[0], law.delay_s, law.lag_s, law.washout_s)
     np.testing.assert_allclose(found, (0.7, 0.06, lag_s, washout_s), rtol=0.02)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_noise_that_is_in_no_input_hides_no_law_and_shared_noise_makes_none(seed: int) -> None:
+    """Half as large as the signal it makes R2 0.8 and the gain 0.8 of itself; both are mended."""
+    rng = np.random.default_rng(seed)
+    q = signal.lfilter([1.0], [1.0, -np.exp(-DT_S / 0.3)], rng.standard_normal(SAMPLES))
+    q /= np.std(q)
+    noise = 0.5 * rng.standard_normal(SAMPLES)
+    u = 0.7 * np.concatenate([np.zeros(3), q[:-3]]) + 0.02 * rng.standard_normal(SAMPLES)
+    windows = [np.arange(SAMPLES)]
+    assert feedback_law(DT_S, u, {"q": q + noise}, windows) is None
+    law = feedback_law(DT_S, u, {"q": q + noise}, windows, (0.02, 0.5))
+    assert law is not None
+    np.testing.assert_allclose((law.gains[0], law.delay_s), (0.7, 0.06), atol=0.02)
+    # A law that acts on what is logged has its noise in the input.
+    u = 0.7 * np.concatenate([np.zeros(3), (q + noise)[:-3]])
+    law = feedback_law(DT_S, u, {"q": q + noise}, windows, (0.35, 0.5))
+    assert law is not None
+    np.testing.assert_allclose((law.gains[0], law.delay_s), (0.7, 0.06), atol=0.02)

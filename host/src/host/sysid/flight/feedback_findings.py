@@ -8,6 +8,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from host.arrays import Array, IntArray
+from host.sysid.flight.column_noise import white_deviation
 from host.sysid.flight.data_finding import Feedback, Finding
 from host.sysid.flight.maneuver_detection import LEAD_S, DetectedManeuver, runs_of
 from host.sysid.flight.maneuver_selection import FEWEST
@@ -135,7 +136,8 @@ def _law(
     if not windows:
         return None
     signals = {n: columns[n] for n in names}
-    law = feedback_law(_period_s(columns), columns[surface], signals, windows)
+    noise = _noise(columns, windows, surface, names)
+    law = feedback_law(_period_s(columns), columns[surface], signals, windows, noise)
     if law is None or HOLDING.get((surface, law.signals[0]), 0) * law.gains[0] < 0.0:
         return None
     return law
@@ -158,7 +160,8 @@ def _tracker(
     legs, followed = feedback_legs(dt_s, moved, inner, heading, windows)
     if followed is not None:
         signals[HEADING] = followed
-    law = feedback_law(dt_s, moved, signals, legs)
+    noise = _noise({**columns, **signals}, windows, "aileron_rad", list(signals))
+    law = feedback_law(dt_s, moved, signals, legs, noise)
     if law is None or "phi_rad" not in law.signals:
         return None, ""
     gains = zip(law.signals, law.gains, strict=True)
@@ -183,7 +186,8 @@ def _inner_loop(
     signals = {n: columns[n] for n in names if n in columns}
     if surface == "aileron_rad":
         signals |= _angles_by_rates(columns)
-    law = fast_feedback(_period_s(columns), columns[surface], signals, windows)
+    noise = _noise({**columns, **signals}, windows, surface, list(signals))
+    law = fast_feedback(_period_s(columns), columns[surface], signals, windows, noise)
     if law is None or not set(ATTITUDE) & set(law.signals):
         return None, ""
     gains = zip(law.signals, law.gains, strict=True)
@@ -207,6 +211,14 @@ def _angles_by_rates(columns: Mapping[str, Array]) -> dict[str, Array]:
     rates = {"phi_rad": p + np.sin(theta) * heading_rate, HEADING: heading_rate}
     dt_s = _period_s(columns)
     return {n: cumulative_trapezoid(v, dx=dt_s, initial=0) for n, v in rates.items()}
+
+
+def _noise(
+    columns: Mapping[str, Array], windows: Sequence[IntArray], surface: str, names: Sequence[str]
+) -> list[float]:
+    """Return the deviation of the white noise of a surface and of what it may follow."""
+    every = np.column_stack([columns[name] for name in (surface, *names)])
+    return [float(v) for v in white_deviation([every[rows] for rows in windows])]
 
 
 def _period_s(columns: Mapping[str, Array]) -> float:

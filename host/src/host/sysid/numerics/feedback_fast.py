@@ -27,7 +27,11 @@ AT_LIMIT = 0.98  # of the largest departure from the middle: there no law moves 
 
 
 def fast_feedback(
-    dt_s: float, moved: Array, signals: Mapping[str, Array], windows: Sequence[IntArray]
+    dt_s: float,
+    moved: Array,
+    signals: Mapping[str, Array],
+    windows: Sequence[IntArray],
+    noise: Sequence[float] = (),
 ) -> FeedbackLaw | None:
     """Return the law that the quick part of an input follows; None if it follows none.
 
@@ -41,6 +45,8 @@ def fast_feedback(
         What it may follow.
     windows : sequence of IntArray
         Samples of each window; what is near a limit of the input is left out.
+    noise : sequence of float
+        Deviation of the white noise of the input and of each signal.
     """
     half = round(0.5 * NEIGHBOURHOOD_S / dt_s)
     if 2 * half + 1 < FEWEST:
@@ -57,7 +63,7 @@ def fast_feedback(
         quick[around] = values[around] - slow
     pieces = _between_jumps(dt_s, quick, pieces, half)
     parts = {name: quick[:, 1 + k] for k, name in enumerate(names)}
-    return feedback_law(dt_s, quick[:, 0], parts, pieces)
+    return feedback_law(dt_s, quick[:, 0], parts, pieces, noise)
 
 
 def _inside(moved: Array, window: IntArray, half: int) -> list[IntArray]:

@@ -7,6 +7,10 @@ that would undo the aircraft. An aircraft answers its input later, a law answers
 a law must explain the input from what was, better than anything does from what is to come. In
 closed loop only what such a law leaves over tells input and signals apart (Soderstrom & Stoica,
 System Identification, 1989, ch. 10).
+
+An autopilot has gyros of its own, or reads the logged ones at another time: the noise of measured
+signals is then in no input. It hides a law and makes its gains small. Where its size is known it is
+taken out of the products of the signals (Fuller, Measurement Error Models, 1987, sec. 2.2).
 """
 
 from __future__ import annotations
@@ -29,6 +33,7 @@ WASHOUTS_S = (np.inf, 4.0, 2.0, 1.0, 0.5)
 WORTH = 0.7  # of what is left unexplained: a further signal must leave no more
 FILTER_WORTH = 0.5  # the same of a filter
 TOGETHER_WORTH = 0.25  # the same of several signals at once
+ENOUGH_R2 = 0.99  # an input so well explained asks for no further signal or filter
 MOST_SIGNALS = 4
 HOPELESS = 0.4  # R2 of all signals at their best delay, without a filter
 FEEDBACK_R2 = 0.9  # R2 from which an input is a function of the signals
@@ -36,6 +41,16 @@ BETTER = 0.6  # of what later signals leave unexplained: earlier ones must leave
 LEAST_DECAY = 1e-3  # of a filter's state at the start of a record
 RIDGE = 1e-10  # of a signal's power
 WHOLE = 1e-9  # of a sample: less is rounding
+MOST_NOISE = 0.5  # of any sum of signals, and of the input: a noisier one tells no law
+NOISE_KNOWN = 0.1  # a law leaves this share of its noise at least: no better is it known
+SHARED = 0.5  # of the noise: a law that explains more than there is by this has it in the input too
+MORE = 0.5  # of what is explained, where R2 is as large as noise allows: the better delay
+WORSE = 0.01  # in R2 than on the grid: no better delay or filter
+FLAT = 0.8  # of the largest value: a lower neighbour is on no parabola with it
+IMPULSE_ROWS = 500  # of a filter's response, for its noise
+# With noise, input and signals are smoothed: the law stays as it is, and between samples is as much
+# noise as at them, which would make those delays the better ones.
+BELL = np.array([1.0, 4.0, 6.0, 4.0, 1.0]) / 16.0
 Shape = tuple[float, float]  # lag and wash-out, s
 NO_FILTER: Shape = (0.0, np.inf)
 SHAPES: tuple[Shape, ...] = tuple((lag, wash) for lag in LAGS_S for wash in WASHOUTS_S)
@@ -68,16 +83,21 @@ class FeedbackLaw:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """Signals by number, with their filter (lag, wash-out) and delay."""
+    """Signals by number, with their filter (lag, wash-out) and delay; is noise taken out?"""
 
     r2: float = 0.0
     signals: tuple[int, ...] = ()
     shape: Shape = NO_FILTER
     delay_s: float = 0.0
+    cleaned: bool = False
 
 
 def feedback_law(
-    dt_s: float, moved: Array, signals: Mapping[str, Array], windows: Sequence[IntArray]
+    dt_s: float,
+    moved: Array,
+    signals: Mapping[str, Array],
+    windows: Sequence[IntArray],
+    noise: Sequence[float] = (),
 ) -> FeedbackLaw | None:
     """Return the law that an input follows in some windows; None if it follows none.
 
@@ -91,41 +111,73 @@ def feedback_law(
         What it may follow.
     windows : sequence of IntArray
         Samples of each window; each has a constant of its own.
+    noise : sequence of float
+        Deviation of the white noise of the input and of each signal; none where it is empty.
     """
     if not signals:
         return None
-    record = _Record(dt_s, moved, np.column_stack(list(signals.values())), windows)
+    values, names = np.column_stack(list(signals.values())), tuple(signals)
+    record = _Record(dt_s, moved, values, windows, noise)
+    before = _before(record)
+    law = _law(record, before, names)
+    if law is None and len(noise) and before.r2 >= FEEDBACK_R2:
+        # All of the noise may be in the input too.
+        record = _Record(dt_s, moved, values, windows)
+        law = _law(record, _before(record), names)
+    return law
+
+
+def _delays() -> Array:
+    return STEP_S * np.arange(round(LONGEST_S / STEP_S) + 1)
+
+
+def _before(record: _Record) -> _Found:
+    """Return what of earlier signals explains the input, nothing where that is hopeless."""
     if record.rows.size < FEWEST_ROWS or not float(record.target @ record.target) > 0.0:
-        return None
-    steps = STEP_S * np.arange(round(LONGEST_S / STEP_S) + 1)
-    everything = tuple(range(len(signals)))
-    if np.max(_r2(record.products(NO_FILTER, steps), everything)) < HOPELESS:
-        return None
-    before = _simplest(record, dict.fromkeys(SHAPES, steps), FEEDBACK_R2)
+        return _Found()
+    everything = range(record.values.shape[1])
+    if np.max(_r2(*record.products(NO_FILTER, _delays()), everything)) < HOPELESS:
+        return _Found()
+    return _simplest(record, dict.fromkeys(SHAPES, _delays()), FEEDBACK_R2)
+
+
+def _law(record: _Record, before: _Found, names: Sequence[str]) -> FeedbackLaw | None:
+    """Return the law, if earlier signals explain enough, and better than later ones."""
     if before.r2 < FEEDBACK_R2:
         return None
-    after = _simplest(record, {shape: -shape[0] - steps[RESPONSE_STEPS:] for shape in SHAPES})
+    later = {shape: -shape[0] - _delays()[RESPONSE_STEPS:] for shape in SHAPES}
+    after = _simplest(record, later)
     if 1.0 - before.r2 > BETTER * (1.0 - after.r2):
         return None
-    return _refined(record, before, tuple(signals))
+    return _refined(record, before, names)
 
 
 class _Grid(NamedTuple):
-    """Delays of each filter, and products of the input and all signals behind them.
+    """Delays of each filter, products of the input and all signals behind them, and of noise.
 
-    Those are of shape (filters, delays, 1 + signals, 1 + signals).
+    Those are of shape (filters, delays, 1 + signals, 1 + signals), noise has no last axis.
     """
 
     delays_s: Mapping[Shape, Array]
     products: Array
+    noise: Array
 
 
 class _Record:
     """The input and the signals in some windows, behind any filter and delay."""
 
     def __init__(
-        self, dt_s: float, moved: Array, values: Array, windows: Sequence[IntArray]
+        self,
+        dt_s: float,
+        moved: Array,
+        values: Array,
+        windows: Sequence[IntArray],
+        noise: Sequence[float] = (),
     ) -> None:
+        if len(noise):
+            windows = [np.asarray(w)[len(BELL) // 2 : -(len(BELL) // 2)] for w in windows]
+            moved, *smoothed = (np.convolve(x, BELL, "same") for x in (moved, *values.T))
+            values = np.column_stack(smoothed)
         stride = max(1, -(-sum(len(w) for w in windows) // MOST_ROWS))
         kept = [np.asarray(w)[::stride] for w in windows if len(w)]
         self.dt_s = dt_s
@@ -134,6 +186,9 @@ class _Record:
         self.rows: IntArray = np.concatenate(kept) if kept else np.zeros(0, dtype=np.int64)
         self.sizes = np.array([len(w) for w in kept])
         self.target = self._centred(moved[self.rows][None, :, None])[0, :, 0]
+        self.power = np.zeros(1 + values.shape[1])  # of white noise, before it is smoothed
+        if len(noise):
+            self.power = (self.rows.size - self.sizes.size) * np.square(noise)
 
     def _centred(self, values: Array) -> Array:
         """Return values (delays, rows, columns) without the mean of each window."""
@@ -143,11 +198,18 @@ class _Record:
         means = np.add.reduceat(values, starts, axis=1) / self.sizes[None, :, None]
         return np.asarray(values - np.repeat(means, self.sizes, axis=1))
 
-    def products(self, shape: Shape, delays: Array) -> Array:
-        """Return products of the input and all signals, (delays, 1 + signals, 1 + signals)."""
-        values = self._of_grid(shape) if shape in SHAPES else self._filtered(shape)
+    def products(self, shape: Shape, delays: Array) -> tuple[Array, Array]:
+        """Return products of the input and all signals, (delays, 1 + signals, 1 + signals).
+
+        With them what noise adds to the squares, (delays, 1 + signals).
+        """
+        values = self._of_grid(shape) if shape in SHAPES else self._filtered(shape, self.values)
         whole = np.floor(delays / self.dt_s + WHOLE).astype(np.int64)
         part = (delays / self.dt_s - whole)[:, None, None]
+        noise = self.power * np.ones((len(delays), 1))
+        if self.power.any():
+            noise[:, 0] *= BELL @ BELL
+            noise[:, 1:] *= self._noise_gain(shape, part[:, 0])
         at = self.rows[None, :] - whole[:, None]
         last = len(values) - 1
         late = values[np.clip(at, 0, last)]
@@ -157,10 +219,17 @@ class _Record:
         both = np.concatenate([target, self._centred(late)], axis=2)
         for decay in self._free_decays(shape):
             both -= decay[:, None] * (decay @ both)[:, None, :]
-        return np.asarray(both.transpose(0, 2, 1) @ both)
+        return np.asarray(both.transpose(0, 2, 1) @ both), noise
 
-    def _filtered(self, shape: Shape) -> Array:
-        values: Array = self.values
+    def _noise_gain(self, shape: Shape, part: Array) -> Array:
+        """Return the power of white noise, smoothed, behind a filter, (delays, 1)."""
+        impulse = np.zeros(IMPULSE_ROWS)
+        impulse[1 : 1 + len(BELL)] = BELL
+        response = self._filtered(shape, impulse)
+        between = (1.0 - part) * response[1:] + part * response[:-1]
+        return np.asarray(np.sum(between**2, axis=1, keepdims=True))
+
+    def _filtered(self, shape: Shape, values: Array) -> Array:
         for b, a in _sections(*shape, self.dt_s):
             values = first_order_filter(b, a, values)
         return values
@@ -177,7 +246,7 @@ class _Record:
             either = self._of_grid((lag_s, np.inf)) + self._of_grid((0.0, washout_s))
             return np.asarray((self.values - either) * (b * g / (1.0 - b - g)))
         if shape not in self._behind:
-            self._behind[shape] = self._filtered(shape)
+            self._behind[shape] = self._filtered(shape, self.values)
         return self._behind[shape]
 
     def _free_decays(self, shape: Shape) -> list[Array]:
@@ -202,12 +271,13 @@ def _simplest(record: _Record, delays_s: Mapping[Shape, Array], least_r2: float 
     once (heading, bank and roll rate of an autopilot): where all together explain far more, those
     that are not worth it are left out one by one. Of every filter as many delays are tried.
     """
-    grid = _Grid(delays_s, np.stack([record.products(*item) for item in delays_s.items()]))
+    products, noise = zip(*(record.products(*item) for item in delays_s.items()), strict=True)
+    grid = _Grid(delays_s, np.stack(products), np.stack(noise))
     best = _Found()
     count = record.values.shape[1]
-    if float(np.max(_r2(grid.products, range(count)))) < least_r2:
+    if float(np.max(_r2(grid.products, grid.noise, range(count)))) < least_r2:
         return best
-    while len(best.signals) < min(MOST_SIGNALS, count):
+    while len(best.signals) < min(MOST_SIGNALS, count) and best.r2 < ENOUGH_R2:
         rest = [k for k in range(count) if k not in best.signals]
         tried = [_best(grid, (*best.signals, k)) for k in rest]
         found = max(tried, key=lambda f: f.r2)
@@ -224,7 +294,8 @@ def _eliminated(grid: _Grid, columns: tuple[int, ...]) -> _Found:
     while len(best.signals) > 1:
         left = (tuple(c for c in best.signals if c != k) for k in best.signals)
         found = max((_best(grid, some) for some in left), key=lambda f: f.r2)
-        if len(best.signals) <= MOST_SIGNALS and 1.0 - best.r2 < WORTH * (1.0 - found.r2):
+        needed = found.r2 < ENOUGH_R2 and 1.0 - best.r2 < WORTH * (1.0 - found.r2)
+        if len(best.signals) <= MOST_SIGNALS and needed:
             break
         best = found
     return best
@@ -233,12 +304,28 @@ def _eliminated(grid: _Grid, columns: tuple[int, ...]) -> _Found:
 def _best(grid: _Grid, columns: tuple[int, ...]) -> _Found:
     """Return filter and delay of some signals: no filter where none is worth it."""
     best = _Found()
-    every = _r2(grid.products, columns)
-    for (shape, delays), r2 in zip(grid.delays_s.items(), every, strict=True):
-        k = int(np.argmax(r2))
-        if not best.signals or 1.0 - r2[k] < FILTER_WORTH * (1.0 - best.r2):
-            best = _Found(float(r2[k]), columns, shape, float(delays[k]))
+    fits = _fits(grid.products, grid.noise, columns)
+    for n, (shape, delays) in enumerate(grid.delays_s.items()):
+        tried = []
+        for cleaned, fit in enumerate(fits):
+            k = int(np.argmax(fit.explained[n]))
+            r2 = float(fit.r2[n, k]) + (_rise(fit.explained[n], k) if cleaned else 0.0)
+            tried.append(_Found(min(r2, 1.0), columns, shape, float(delays[k]), bool(cleaned)))
+        found = max(tried, key=lambda f: f.r2)
+        worth = best.r2 < ENOUGH_R2 and 1.0 - found.r2 < FILTER_WORTH * (1.0 - best.r2)
+        if not best.signals or worth:
+            best = found
     return best
+
+
+def _rise(values: Array, k: int) -> float:
+    """Return by how much the parabola through the largest value and its neighbours rises more."""
+    if not 0 < k < len(values) - 1:
+        return 0.0
+    before, top, after = (float(v) for v in values[k - 1 : k + 2])
+    if min(before, after) < FLAT * top:
+        return 0.0
+    return (before - after) ** 2 / (8.0 * max(2.0 * top - before - after, 1e-300))
 
 
 def _refined(record: _Record, found: _Found, names: Sequence[str]) -> FeedbackLaw:
@@ -254,12 +341,16 @@ def _refined(record: _Record, found: _Found, names: Sequence[str]) -> FeedbackLa
         lag = float(np.exp(p[1])) if lagged else 0.0
         return max(float(p[0]), 0.0), lag, float(np.exp(p[-1])) if washed else np.inf
 
-    def gram(p: Array) -> Array:
+    def gram(p: Array) -> tuple[Array, Array]:
         delay, lag, wash = law(p)
         return record.products((lag, wash), np.array([delay]))
 
+    def fit(p: Array) -> _Fit:
+        return _fits(*gram(p), found.signals)[int(found.cleaned)]
+
     def left(p: Array) -> float:
-        return float(1.0 - _r2(gram(p), found.signals)[0])
+        [r2], [explained], _ = fit(p)
+        return float(1.0 - r2 - MORE * explained)
 
     simplex = np.vstack([start, start + np.diag([STEP_S / 2.0, *[0.3] * len(shape)])])
     best = optimize.minimize(
@@ -268,27 +359,71 @@ def _refined(record: _Record, found: _Found, names: Sequence[str]) -> FeedbackLa
         method="Nelder-Mead",
         options={"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-6, "maxfev": 80},
     )
+    # Time constants that let the signals be mostly noise explain more than there is.
+    x = start if fit(start).r2[0] > fit(best.x).r2[0] + WORSE else best.x
     at = [1 + k for k in found.signals]
-    [g] = gram(best.x)
-    gains = np.linalg.lstsq(g[np.ix_(at, at)], g[at, 0], rcond=None)[0]
-    order = np.argsort(-np.abs(gains) * np.sqrt(np.diag(g)[at]))
+    [r2], _, [gains] = fit(x)
+    order = np.argsort(-np.abs(gains) * np.sqrt(np.diag(gram(x)[0][0])[at]))
     return FeedbackLaw(
         tuple(names[found.signals[k]] for k in order),
         tuple(float(gains[k]) for k in order),
-        *law(best.x),
-        1.0 - float(best.fun),
+        *law(x),
+        float(r2),
     )
 
 
-def _r2(products: Array, columns: Sequence[int]) -> Array:
+def _r2(products: Array, noise: Array, columns: Sequence[int]) -> Array:
     """Return R2 of the input by some signals, of each matrix of products, (...)."""
+    return np.asarray(np.max([fit.r2 for fit in _fits(products, noise, columns)], axis=0))
+
+
+class _Fit(NamedTuple):
+    """Of each matrix of products: R2, share of the input's power explained, gains (..., signals).
+
+    What is explained may be more than there is, as noise is not known exactly. It tells the better
+    delay; R2 is no better than noise is known.
+    """
+
+    r2: Array
+    explained: Array
+    gains: Array
+
+
+def _fits(products: Array, noise: Array, columns: Sequence[int]) -> list[_Fit]:
+    """Return the fit of the input by some signals as they are, and, if there is noise, without."""
     at = [1 + k for k in columns]
-    own, cross = products[..., at, :][..., at], products[..., at, 0]
-    scale = np.sqrt(np.maximum(np.diagonal(own, axis1=-2, axis2=-1), 1e-300))
-    own = own / (scale[..., :, None] * scale[..., None, :]) + RIDGE * np.eye(len(at))
-    cross = cross / scale
-    solved = np.linalg.solve(own, cross[..., None])[..., 0]
-    return np.asarray(np.sum(solved * cross, axis=-1) / np.maximum(products[..., 0, 0], 1e-300))
+    scale = np.sqrt(np.maximum(np.diagonal(products, axis1=-2, axis2=-1), 1e-300))
+    scaled = products / (scale[..., :, None] * scale[..., None, :])
+    own, cross = scaled[..., at, :][..., at] + RIDGE * np.eye(len(at)), scaled[..., at, 0]
+    unit = scale[..., :1] / scale[..., at]
+    gains = np.linalg.solve(own, cross[..., None])[..., 0]
+    r2 = np.sum(gains * cross, axis=-1)
+    fits = [_Fit(r2, r2, gains * unit)]
+    if noise.any():
+        share = noise / scale**2
+        r2, explained, gains = _cleaned(own, cross, (share[..., 0], share[..., at]), r2)
+        fits.append(_Fit(r2, explained, gains * unit))
+    return fits
+
+
+def _cleaned(own: Array, cross: Array, noise: tuple[Array, Array], r2: Array) -> _Fit:
+    """Return the fit without the shares of noise in input and signals, all of unit power.
+
+    Where these, or what is left with them, are mostly noise nothing is explained. More may be
+    explained than there is: noise that is in the input too was none.
+    """
+    moved, share = noise
+    # No sum of signals has a larger part of noise than this.
+    part = np.sum(share * np.diagonal(np.linalg.inv(own), axis1=-2, axis2=-1), axis=-1)
+    usable = (part < MOST_NOISE) & (r2 > MOST_NOISE)
+    clean = own - np.where(usable[..., None], share, 0.0)[..., None] * np.eye(own.shape[-1])
+    gains = np.linalg.solve(clean, cross[..., None])[..., 0]
+    explained = np.sum(gains * cross, axis=-1)
+    random = np.sum(share * gains**2, axis=-1) + moved
+    left = 1.0 - explained - moved
+    left = np.maximum(np.maximum(left, -left - SHARED * random), NOISE_KNOWN * random)
+    usable &= random < MOST_NOISE
+    return _Fit(np.where(usable, 1.0 - left, 0.0), np.where(usable, explained, 0.0), gains)
 
 
 def _sections(lag_s: float, washout_s: float, dt_s: float) -> Iterator[tuple[Array, Array]]:
