@@ -124,7 +124,7 @@ def test_a_template_holds_the_truth_beside_its_bends(held: bool, seed: int) -> N
     """A smooth input bends between samples: M_de was 0.22 % off, known to 0.11. Of a held one the
     delay of the gyro sat on its bound, and Z_de was 2.5 % off, known to 1.5.
 
-    Without an accelerometer Z_de is what a vane late by 10 ms leaves of M_de, and no better known.
+    Without an accelerometer Z_de is what a vane late by 20 ms leaves of M_de, and no better known.
     """
     [answer] = host.identify(
         unstable(held=held, seed=seed), models="short-period", from_s=0.0, to_s=3.0
@@ -133,7 +133,7 @@ def test_a_template_holds_the_truth_beside_its_bends(held: bool, seed: int) -> N
     for name, value in TRUTH.items():
         k = answer.result.index(name)
         assert abs(answer.result.estimate[k] - value) < half[k], name
-        by_a_late_vane = 0.01 * abs(TRUTH["M_de"]) if name == "Z_de" else 0.0
+        by_a_late_vane = 0.02 * abs(TRUTH["M_de"]) if name == "Z_de" else 0.0
         assert half[k] < max(0.07 * abs(value), by_a_late_vane), name
 
 
