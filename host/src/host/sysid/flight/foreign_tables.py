@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 TEXT_KINDS = (".csv", ".tsv", ".txt", ".dat")
 MOST_UNIT_ROWS = 2
+LARGEST = 1e20  # nanoseconds since 1970 are 2e18; a response that diverges is no measurement
 # How files of others begin that end up here, and what to do with them.
 OTHERS = (
     (b"PK\x03\x04", "a spreadsheet or an archive: save it as CSV, Parquet or MAT"),
@@ -138,9 +139,9 @@ def from_frame(frame: pd.DataFrame) -> Foreign:
 
 
 def leave_infinities_out(found: Foreign) -> None:
-    """Take what is infinite in a column for missing, and say so."""
+    """Take what is infinite in a column, or as good as, for missing, and say so."""
     for name, values in found.columns.items():
-        infinite = np.isinf(values)
+        infinite = np.abs(values) > LARGEST
         if infinite.any():
             found.columns[name] = np.where(infinite, np.nan, values)
             line = f"{np.sum(infinite)} of {len(values)} values are infinite and count as missing"
