@@ -15,6 +15,7 @@ from host.sysid.estimators.gust_penetration import PREFIX, ROLL_STATES, with_gus
 from host.sysid.estimators.innovations import innovations_of
 from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.noise_model_comparison import DECISIVE, bayes_criterion
+from host.sysid.estimators.output_error_fit import NO_CONVERGENCE
 from host.sysid.estimators.start_values import start_values_of
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult, without_parameters
@@ -95,6 +96,7 @@ def fit_with_gust(
     if by_prior(model) and not calm:
         calm = not _moves(result, bare, shifted)
     if unfit and calm:
+        first = _ended(first)
         first = replace(first, warnings=(*first.warnings, unfit))
         return GustFit(first, model, tuple(maneuvers), {})
     if result.residual_kind == "innovation":
@@ -102,6 +104,14 @@ def fit_with_gust(
         covariance[:count, :count] += late.covariance
         result = replace(result, covariance=covariance)
     return GustFit(result, result.model, tuple(shifted), late.delays)
+
+
+def _ended(result: FitResult) -> FitResult:
+    """Return output error that ended at a kink as converged: the cost over a delay has some."""
+    if result.converged or not near_its_optimum(result):
+        return result
+    others = tuple(w for w in result.warnings if not w.startswith(NO_CONVERGENCE))
+    return replace(result, converged=True, warnings=others)
 
 
 def _moves(moving: FitResult, bare: LinearModel, shifted: Sequence[Maneuver]) -> bool:

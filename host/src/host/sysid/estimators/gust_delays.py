@@ -132,8 +132,9 @@ def estimate_delays(
     gust_mps = gust_deviation_mps(found, airspeed_mps)
     by_gusts = gust_mps / float(np.hypot(gust_mps, CALM_MPS))
     passing_s = {
-        d.name: (by_gusts * VANE_SHARE if _late_by_pade(d) else HOLD_SHARE)
-        * sampling_step_s(d, model, maneuvers)
+        d.name: by_gusts * VANE_SHARE * dt_s
+        if _late_by_pade(d)
+        else HOLD_SHARE * sampling_step_s(d, model, maneuvers)
         for d in groups
     }
     widened = _with_hold_error(found, groups, passing_s)
@@ -262,7 +263,7 @@ def _with_delay_terms(
                 for j, gain in enumerate(gains)
                 if gain
             ]
-    still = np.zeros((size - n, 2 * count))
+    still, by_force = np.zeros((size - n, 2 * count)), bool(set(FORCES) & set(wide.outputs))
     return replace(
         wide,
         states=(*wide.states, *(f"{y} late by {k}" for _, y in vanes for k in range(PADE_STATES))),
@@ -272,7 +273,10 @@ def _with_delay_terms(
         C=wider_C,
         D=np.hstack([wide.D, np.zeros_like(wide.D)]),
         terms=tuple(terms),
-        parameters=(*wide.parameters, *(_parameter(d, removed[d.name], dt_s) for d in groups)),
+        parameters=(
+            *wide.parameters,
+            *(_parameter(d, removed[d.name], dt_s, by_force=by_force) for d in groups),
+        ),
     )
 
 
@@ -285,14 +289,15 @@ def _removable(delay: DelayGroup, value_s: float, dt_s: float) -> float:
     return dt_s * round(value_s / dt_s) if _late_by_pade(delay) else value_s
 
 
-def _parameter(delay: DelayGroup, removed_s: float, dt_s: float) -> Parameter:
+def _parameter(delay: DelayGroup, removed_s: float, dt_s: float, *, by_force: bool) -> Parameter:
     """Return what stands for a delay of which a part is removed already; the prior is of all."""
     if not _late_by_pade(delay):
         return Parameter(delay.name, -removed_s, prior_sd=delay.prior_sd_s)
     return Parameter(
         delay.name,
-        # About T = dt, where what is left of it ends once whole samples are removed.
-        1.0 / dt_s + removed_s / dt_s**2,
+        # About the whole of it where little else tells it. A force tells it better than the prior:
+        # about T = dt, where what is left of it ends, searches end that did not about the whole.
+        1.0 / dt_s + (0.0 if by_force else removed_s / dt_s**2),
         lower=1.0 / (dt_s + delay.limit_s),
         upper=1.0 / (SHORTEST_SHARE * dt_s),
         prior_sd=delay.prior_sd_s / dt_s**2,

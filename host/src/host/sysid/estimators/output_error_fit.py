@@ -25,6 +25,7 @@ from host.sysid.numerics.nonlinear_problem import output_problem
 from host.sysid.numerics.output_error import unidentifiable_covariance, whitened_sensitivities
 from host.sysid.numerics.output_error_problem import OutputProblem
 
+NO_CONVERGENCE = "no convergence"
 SAME_RATE = 1.02  # sample periods that differ by less: ceramic resonators do, by half a per cent
 
 
@@ -101,6 +102,7 @@ def fit_output_error(
         warnings=_warnings(problem, fit),
         details={
             "cost": fit.optimum.cost,
+            "last_step_bounds": fit.optimum.step,
             "refits": float(fit.refits),
             "noise_orders": np.array([float(n.order) for n in fit.noise]),
             "innovation_variance": fit.innovation_variance,
@@ -150,7 +152,7 @@ def _warnings(problem: OutputProblem, fit: ArNoiseFit) -> tuple[str, ...]:
     warnings = []
     if not fit.optimum.converged:
         warnings.append(
-            f"no convergence: the last step was {fit.optimum.step:.3g} Cramer-Rao bounds long"
+            f"{NO_CONVERGENCE}: the last step was {fit.optimum.step:.3g} Cramer-Rao bounds long"
         )
     on_bound = [n for n, free in zip(problem.names, fit.optimum.free, strict=True) if not free]
     if on_bound:
