@@ -103,9 +103,9 @@ def add_jumps(
     for j in range(len(shift)):
         if input_column[j] < 0 or u[0, j] == u[1, j]:
             continue
-        rates(x, u[0], p, c, t, work[0])
-        u[0, j] = u[1, j]
-        rates(x, u[0], p, c, t, work[1])
+        for side in range(2):  # one call: code of six degrees of freedom compiles for seconds
+            rates(x, u[0], p, c, t, work[side])
+            u[0, j] = u[1, j]
         for i in range(len(x)):
             S[i, input_column[j]] += work[0, i] - work[1, i]
 
