@@ -76,7 +76,7 @@ def fit_fails(answer: Answer, evidence: Evidence) -> list[Doubt]:
     return [
         one
         for fit in answer.fits
-        if fails(fit) and not _as_gusts_make(answer.explained, fit.name)
+        if fails(fit) and not _as_gusts_make(answer.explained, fit)
         for one in _about(
             answer, [fit.name], f"the fit fails in {fit.name} (NRMSE {percent(fit.nrmse)})"
         )
@@ -230,14 +230,18 @@ def unpredicted(answer: Answer) -> list[SignalFit]:
     return [
         f
         for f in answer.validation
-        if (fails(f) and not _as_gusts_make(allowed, f.name))
+        if (fails(f) and not _as_gusts_make(allowed, f))
         or (f.name in allowed and not allowed[f.name].holds)
     ]
 
 
-def _as_gusts_make(allowed: Mapping[str, Prediction], name: str) -> bool:
-    """Return whether an output is missed by no more than gusts among the model's states make."""
-    return name in allowed and allowed[name].by_gusts and allowed[name].holds
+def _as_gusts_make(allowed: Mapping[str, Prediction], fit: SignalFit) -> bool:
+    """Return whether an output is missed by no more than gusts among the model's states make.
+
+    They are part of its motion: what misses all of it is not theirs.
+    """
+    found = allowed.get(fit.name)
+    return found is not None and found.by_gusts and found.holds and fit.nrmse < WORSE_THAN_NONE
 
 
 def fails(fit: SignalFit) -> bool:

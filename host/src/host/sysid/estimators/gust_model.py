@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -135,6 +136,21 @@ def gust_model(
         parameters=parameters,
         delays=(),
     )
+
+
+def driven_model(model: LinearModel, process: Sequence[str], airspeed_mps: float) -> LinearModel:
+    """Return the model with every state that process noise drives: a template gets its gust.
+
+    Parameters
+    ----------
+    model : LinearModel
+        As fitted, without gust states; those of a user are in his model.
+    process : sequence of str
+        Of `innovations.driven_states`.
+    airspeed_mps : float
+        Of the trim, m/s.
+    """
+    return model if set(process) <= set(model.states) else gust_model(model, airspeed_mps)
 
 
 def gust_deviation_mps(result: FitResult, airspeed_mps: float) -> float:

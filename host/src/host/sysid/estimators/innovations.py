@@ -83,12 +83,17 @@ class Innovations:
         return np.asarray(self.covariance * np.outer(factor, factor))
 
 
+def driven_states(result: FitResult) -> tuple[str, ...]:
+    """Return the states that process noise of a fit drives; none of other methods."""
+    return tuple(n.removeprefix(PROCESS) for n in result.names if n.startswith(PROCESS))
+
+
 def innovations_of(
     result: FitResult, model: LinearModel, maneuvers: Sequence[Maneuver]
 ) -> Innovations | None:
     """Return the innovations of a filter-error result on this model; None if the filter fails."""
     theta, covariance = result.estimate, result.covariance_white
-    process = tuple(n.removeprefix(PROCESS) for n in result.names if n.startswith(PROCESS))
+    process = driven_states(result)
     if isinstance(model, NonlinearModel):
         return _of_equations(result, model, maneuvers, process)
     problem = FilterProblem(model, maneuvers, process)

@@ -14,8 +14,8 @@ import numpy as np
 from scipy import special
 
 from host.arrays import Array
-from host.sysid.estimators.gust_model import gust_model
-from host.sysid.estimators.innovations import PROCESS, score_covariances
+from host.sysid.estimators.gust_model import driven_model
+from host.sysid.estimators.innovations import driven_states, score_covariances
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
@@ -67,13 +67,13 @@ def missing_control(
         Of the trim, for the gust's time scale.
     """
     base = result.model
-    process = tuple(n.removeprefix(PROCESS) for n in result.names if n.startswith(PROCESS))
+    process = driven_states(result)
     if not process or result.residual_kind != "innovation" or isinstance(base, NonlinearModel):
         return None
     added = _absent_entries(base)
     if not added:
         return None
-    wide = base if set(process) <= set(base.states) else gust_model(base, airspeed_mps)
+    wide = driven_model(base, process, airspeed_mps)
     names = [f"absent {k}" for k in range(len(added))]
     wide = replace(
         wide,

@@ -14,8 +14,8 @@ from scipy import special
 
 from host.arrays import Array, BoolArray
 from host.sysid.estimators.coherence_inflation import NoiseExcess
-from host.sysid.estimators.gust_model import gust_model
-from host.sysid.estimators.innovations import PROCESS
+from host.sysid.estimators.gust_model import driven_model
+from host.sysid.estimators.innovations import driven_states
 from host.sysid.flight.free_simulation import FreeResponses, weighted_fit
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
@@ -51,12 +51,12 @@ def excess_over_noise_model(
 
     1 % of right models name any output.
     """
-    process = [n.removeprefix(PROCESS) for n in result.names if n.startswith(PROCESS)]
+    process = driven_states(result)
     if not process:
         return None
     problem, responses = free.problem, free.responses
     model, maneuvers = problem.model, problem.maneuvers
-    wide = model if set(process) <= set(model.states) else gust_model(model, airspeed_mps)
+    wide = driven_model(model, process, airspeed_mps)
     outputs = len(model.outputs)
     observed, samples = np.zeros(outputs), 0
     squares = np.zeros((DRAWS, outputs))

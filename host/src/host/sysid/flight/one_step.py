@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
-from host.sysid.estimators.gust_model import gust_model
-from host.sysid.estimators.innovations import PROCESS, Innovations, innovations_of
+from host.sysid.estimators.gust_model import driven_model
+from host.sysid.estimators.innovations import Innovations, driven_states, innovations_of
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
@@ -199,17 +199,16 @@ def one_step_of(
     Unknowns of output error that sit on a bound stay there, but for those that are `loose`.
     """
     if result.residual_kind == "innovation":
-        noise = any(n.startswith(PROCESS) for n in result.names)
         # A filter whose noise is no parameter of it, as Kalman filters with joint states, has none.
-        return _of_innovations(result, maneuvers, trim) if noise else None
+        return _of_innovations(result, maneuvers, trim) if driven_states(result) else None
     return _of_outputs(result, maneuvers, loose)
 
 
 def _of_innovations(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim) -> OneStep | None:
+    process = driven_states(result)
+
     def filtered(model: LinearModel, at: Trim) -> LinearModel:
-        # Process noise on states of the model alone is filter error without a gust.
-        own = all(n.removeprefix(PROCESS) in model.states for n in result.names if PROCESS in n)
-        return model if own else gust_model(model, at.airspeed_mps)
+        return driven_model(model, process, at.airspeed_mps)
 
     found = innovations_of(result, filtered(result.model, trim), maneuvers)
     if found is None:

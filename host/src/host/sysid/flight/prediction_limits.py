@@ -1,11 +1,13 @@
 """How far a right model may miss a maneuver that it never saw: noise, gusts, its own covariance.
 
 The noise of an output is an AR model of what a free simulation leaves of the fitted maneuvers and
-the inputs do not drive (`numerics.input_coherence`); gusts are in it. Of filter error with states
-that gusts drive it is what these make of it, told one sample ahead. The parameters are uncertain
-by their whole covariance. Constants and start states are fitted to the unseen maneuver too, which
-takes its part out of the error. Errors are drawn at random, and a gamma distribution through their
-mean squares gives the limit.
+the inputs do not drive (`numerics.input_coherence`); gusts are in it. Of a model of the user with
+states that gusts drive it is what these make of it, told one sample ahead. Of a template with a
+gust both are told: slow noise may have passed for gusts, which then allow too little.
+
+The parameters are uncertain by their whole covariance. Constants and start states are fitted to the
+unseen maneuver too, which takes its part out of the error. Errors are drawn at random, and a gamma
+distribution through their mean squares gives the limit.
 """
 
 from __future__ import annotations
@@ -16,7 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.estimators.innovations import PROCESS
+from host.sysid.estimators.gust_model import driven_model
+from host.sysid.estimators.innovations import driven_states
 from host.sysid.flight.free_simulation import free_responses, weighted_fit
 from host.sysid.flight.noise_model_limits import (
     DRAWS,
@@ -48,7 +51,7 @@ class Prediction:
     largest : float
         What noise, gusts and the covariance of the parameters allow.
     by_gusts : bool
-        It is what gusts among the states of the model make, not what was left of other maneuvers.
+        The error is no more than gusts among the states of the model make.
     """
 
     nrmse: float
@@ -67,6 +70,7 @@ def predictions(
     noise: InputCoherence | None,
     maneuvers: Sequence[Maneuver],
     simulated: Sequence[Array],
+    airspeed_mps: float,
 ) -> dict[str, Prediction]:
     """Return how each output of unseen maneuvers is predicted; nothing without noise or maneuver.
 
@@ -81,6 +85,8 @@ def predictions(
         Unseen.
     simulated : sequence of Array, shape (samples, p)
         Their free simulation.
+    airspeed_mps : float
+        Of the trim, for the time scale of gusts.
     """
     if noise is None or not maneuvers:
         return {}
@@ -96,18 +102,19 @@ def predictions(
         motions.append((measured - mean) * seen)
     spread = np.sqrt(np.mean(np.vstack(motions) ** 2, axis=0))
     rms = np.sqrt(np.mean(np.vstack(errors) ** 2, axis=0)) / np.maximum(spread, 1e-300)
-    largest = largest_rms(model, result, noise, maneuvers) / np.maximum(spread, 1e-300)
-    by_gusts = bool(driven_states(model, result))
+    process = driven_states(result)
+    wide = driven_model(model, process, airspeed_mps) if process else None
+    own = model if wide is model else None
+    largest = largest_rms(model, result, noise, maneuvers, own) / np.maximum(spread, 1e-300)
+    made = largest if own else np.zeros(len(rms))
+    if wide is not None and own is None:
+        made = largest_rms(model, result, noise, maneuvers, wide) / np.maximum(spread, 1e-300)
     return {
-        name: Prediction(float(rms[k]), float(largest[k]), by_gusts)
+        name: Prediction(
+            float(rms[k]), float(largest[k]), bool(process) and bool(rms[k] <= made[k])
+        )
         for k, name in enumerate(model.outputs)
     }
-
-
-def driven_states(model: LinearModel, result: FitResult) -> list[str]:
-    """Return the states of the model that process noise of a fit drives; none of other methods."""
-    process = [n.removeprefix(PROCESS) for n in result.names if n.startswith(PROCESS)]
-    return process if set(process) <= set(model.states) else []
 
 
 def largest_rms(
@@ -115,10 +122,12 @@ def largest_rms(
     result: FitResult,
     noise: InputCoherence,
     maneuvers: Sequence[Maneuver],
+    driven: LinearModel | None = None,
 ) -> Array:
     """Return the rms error of each output that a right model rarely exceeds, in means, (p,).
 
-    It is exceeded in 1 % of cases by any output; infinite where the model diverges.
+    It is exceeded in 1 % of cases by any output; infinite where the model diverges. The errors are
+    those of `noise`, or with a model whose states gusts drive (`driven`) what these make.
     """
     count, outputs = len(model.parameter_names), len(model.outputs)
     root = covariance_root(result.covariance[:count, :count])
@@ -127,15 +136,14 @@ def largest_rms(
     squares, samples = np.zeros((DRAWS, outputs)), 0
     freedom = [power_freedom(memory, noise.samples) for memory in noise.noise]
     scale = np.sqrt(np.array([nu / rng.chisquare(nu, DRAWS) for nu in freedom]))  # of its power
-    process = driven_states(model, result)
     for maneuver in maneuvers:
         slopes = _slopes(model, result, maneuver)
         if slopes is None:
             return np.full(outputs, np.inf)
         means = slopes.shape[1]
-        if process:
+        if driven is not None:
             block = block_length(maneuver.dt_s)
-            errors = random_errors(rng, model, result, process, maneuver, block)
+            errors = random_errors(rng, driven, result, driven_states(result), maneuver, block)
         else:
             errors = scale[:, None, :] * np.stack(
                 [
