@@ -23,7 +23,7 @@ from host.sysid.answer.method_agreement import disagreements
 from host.sysid.answer.parameter_places import leaning_on
 from host.sysid.flight.data_finding import Finding, open_channels
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.prediction_limits import Prediction
+from host.sysid.flight.prediction_limits import FAILS, Prediction
 from host.sysid.flight.systematic_errors import is_template, scaled_by_airspeed
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.residual_delays import STANDARD_DELAYS
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 
 AIRSPEED = "airspeed_mps"
-FAILS = 0.5  # NRMSE of an output: a quarter of its variance is not explained
 WORSE_THAN_NONE = 1.0  # NRMSE: the mean would do better
 # Of power along what inputs drive over that of noise: half-widths are more than doubled by it.
 LARGE_RATIO = 4.0

@@ -96,7 +96,7 @@ class LinearValidation:
     Departures from the trim are as measured: airspeed and attitude in products with what moves.
     `predictions` sets the error of each output held out beside what noise and covariance allow;
     `held_out_runs` are the maneuvers held out, with their outputs. `explained` is the same of the
-    maneuvers fitted, where gusts are among the states of the model.
+    maneuvers fitted, where process noise is estimated and an output is missed by half.
     """
 
     simulated: tuple[Array, ...]

@@ -29,12 +29,14 @@ from host.sysid.flight.noise_model_limits import (
     slopes_of_means,
 )
 from host.sysid.models.covariance_root import covariance_root
+from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.ar_noise import ArNoise, autocovariance
 from host.sysid.numerics.input_coherence import InputCoherence, block_length, block_means
 
+FAILS = 0.5  # NRMSE of an output: a quarter of its variance is not explained
 DRAW_SEED = 1
 LONGEST_LAG = 200  # of an autocorrelation that counts, means
 SETTLING = 200  # means before a drawn AR series counts
@@ -51,7 +53,7 @@ class Prediction:
     largest : float
         What noise, gusts and the covariance of the parameters allow.
     by_gusts : bool
-        The error is no more than gusts among the states of the model make.
+        The error is no more than gusts among the states make, where that was asked.
     """
 
     nrmse: float
@@ -70,7 +72,7 @@ def predictions(
     noise: InputCoherence | None,
     maneuvers: Sequence[Maneuver],
     simulated: Sequence[Array],
-    airspeed_mps: float,
+    airspeed_mps: float | None = None,
 ) -> dict[str, Prediction]:
     """Return how each output of unseen maneuvers is predicted; nothing without noise or maneuver.
 
@@ -85,8 +87,8 @@ def predictions(
         Unseen.
     simulated : sequence of Array, shape (samples, p)
         Their free simulation.
-    airspeed_mps : float
-        Of the trim, for the time scale of gusts.
+    airspeed_mps : float, optional
+        Of the trim, for the time scale of the gusts of a template, which are not asked without.
     """
     if noise is None or not maneuvers:
         return {}
@@ -103,11 +105,11 @@ def predictions(
     spread = np.sqrt(np.mean(np.vstack(motions) ** 2, axis=0))
     rms = np.sqrt(np.mean(np.vstack(errors) ** 2, axis=0)) / np.maximum(spread, 1e-300)
     process = driven_states(result)
-    wide = driven_model(model, process, airspeed_mps) if process else None
-    own = model if wide is model else None
+    own = model if process and set(process) <= set(model.states) else None
     largest = largest_rms(model, result, noise, maneuvers, own) / np.maximum(spread, 1e-300)
     made = largest if own else np.zeros(len(rms))
-    if wide is not None and own is None:
+    if process and own is None and airspeed_mps is not None:
+        wide = driven_model(model, process, airspeed_mps)
         made = largest_rms(model, result, noise, maneuvers, wide) / np.maximum(spread, 1e-300)
     return {
         name: Prediction(
@@ -115,6 +117,11 @@ def predictions(
         )
         for k, name in enumerate(model.outputs)
     }
+
+
+def missed(fits: Sequence[SignalFit]) -> bool:
+    """Return whether any output is missed by so much that gusts must make it, or the fit fails."""
+    return any(not one.nrmse < FAILS for one in fits)
 
 
 def largest_rms(
