@@ -144,7 +144,7 @@ def driven_model(model: LinearModel, process: Sequence[str], airspeed_mps: float
     Parameters
     ----------
     model : LinearModel
-        As fitted, without gust states; those of a user are in his model.
+        As fitted. A template has no gust state yet; a user's model has its own.
     process : sequence of str
         Of `innovations.driven_states`.
     airspeed_mps : float

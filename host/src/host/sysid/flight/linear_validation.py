@@ -52,7 +52,7 @@ def linear_validation(
     held_out_fits = fits_of(e.model, held_out, held_out_runs)
     noise, airspeed_mps = intervals.coherence, e.trim.airspeed_mps
     explained: dict[str, Prediction] = {}
-    # Drawn gusts cost a tenth of the default answer: only where they could matter.
+    # Drawing gusts took 8 % of the five-minute default: only where an output is missed by half.
     if driven_states(total) and missed(fits):
         explained = predictions(e.model, total, noise, e.maneuvers, simulated, airspeed_mps)
     asked_mps = airspeed_mps if missed(held_out_fits) else None

@@ -1,9 +1,10 @@
 """How far a right model may miss a maneuver that it never saw: noise, gusts, its own covariance.
 
 The noise of an output is an AR model of what a free simulation leaves of the fitted maneuvers and
-the inputs do not drive (`numerics.input_coherence`); gusts are in it. Of a model of the user with
-states that gusts drive it is what these make of it, told one sample ahead. Of a template with a
-gust both are told: slow noise may have passed for gusts, which then allow too little.
+the inputs do not drive (`numerics.input_coherence`); gusts are in it. A user's model whose states
+process noise drives is allowed what that noise makes. For a template with a gust state the AR model
+stays the limit, because slow noise may have passed for gusts. What its gusts make decides whether
+an output that is missed by half is a failure of the fit.
 
 The parameters are uncertain by their whole covariance. Constants and start states are fitted to the
 unseen maneuver too, which takes its part out of the error. Errors are drawn at random, and a gamma
@@ -53,7 +54,8 @@ class Prediction:
     largest : float
         What noise, gusts and the covariance of the parameters allow.
     by_gusts : bool
-        The error is no more than gusts among the states make, where that was asked.
+        The error is no more than what process noise of the fit makes. False for a template where
+        `predictions` had no airspeed.
     """
 
     nrmse: float
@@ -88,7 +90,7 @@ def predictions(
     simulated : sequence of Array, shape (samples, p)
         Their free simulation.
     airspeed_mps : float, optional
-        Of the trim, for the time scale of the gusts of a template, which are not asked without.
+        Of the trim, for the time scale of a template's gusts. Without it they are not drawn.
     """
     if noise is None or not maneuvers:
         return {}
@@ -107,20 +109,18 @@ def predictions(
     process = driven_states(result)
     own = model if process and set(process) <= set(model.states) else None
     largest = largest_rms(model, result, noise, maneuvers, own) / np.maximum(spread, 1e-300)
-    made = largest if own else np.zeros(len(rms))
+    made = largest if own else np.full(len(rms), -np.inf)
     if process and own is None and airspeed_mps is not None:
         wide = driven_model(model, process, airspeed_mps)
         made = largest_rms(model, result, noise, maneuvers, wide) / np.maximum(spread, 1e-300)
     return {
-        name: Prediction(
-            float(rms[k]), float(largest[k]), bool(process) and bool(rms[k] <= made[k])
-        )
+        name: Prediction(float(rms[k]), float(largest[k]), bool(rms[k] <= made[k]))
         for k, name in enumerate(model.outputs)
     }
 
 
 def missed(fits: Sequence[SignalFit]) -> bool:
-    """Return whether any output is missed by so much that gusts must make it, or the fit fails."""
+    """Return whether the error of any output is half of its motion or more."""
     return any(not one.nrmse < FAILS for one in fits)
 
 
