@@ -1,11 +1,12 @@
 """Do surfaces move between samples as servos do, along lines, or are they held?
 
 Where an instrument's file says how they were measured they move, kinks included (`input_kinks`).
-Of a table of others the data say: how far from lines to that motion is one more parameter of white
-output error, its delays beside it. A line cuts the bends of a servo off: at 50 Hz L_p was 0.8 %
-small by it and L_da 0.9 % large, known to 0.7. Of surfaces that are held (a simulator without a
-servo) a line is half a sample early, and every sensor seemed late: at 50 Hz the IMU by all of its
-bound.
+Of a table of others the data may say: how far from lines to that motion is one more parameter of
+white output error, its delays beside it. Where they do not, and in gusts they do not, surfaces move
+as servos do. A line cuts the bends of a servo off: at 50 Hz L_p was 0.8 % small by it and L_da
+0.9 % large, known to 0.7; at 100 Hz M_alpha was 0.4 % large, known to 1.4. Of surfaces that are
+held (a simulator without a servo) a line is half a sample early, and every sensor seemed late: at
+50 Hz the IMU by all of its bound.
 """
 
 from __future__ import annotations
@@ -57,6 +58,8 @@ def between_samples(
 ) -> str:
     """Return how surfaces moved between samples: of a table of others as its outputs show it.
 
+    As servos do where they show nothing: straight lines and steps of a surface stay as they are.
+
     Parameters
     ----------
     used : sequence of FlownManeuver
@@ -80,16 +83,18 @@ def between_samples(
     try:
         result = fit("output-error-white", model, data, multiple_starts=False)
     except IdentificationError:
-        return LINES
+        return SERVOS
     found = one_step_of(result, data, trim, [d.name for d in model.delays])
     if found is None:
-        return LINES
+        return SERVOS
     bent = (model, [m.cut(model) for m in with_moving_surfaces(used)])
     held = (replace(model, hold=OTHER_HOLD[model.hold]), data)
     # Held surfaces jump, which also bends: what explains more is the motion.
-    likely = [_whole_way(*found.share_of(one, result, trim, data, 1.0)) for one in (bent, held)]
-    best = int(np.argmax(likely))
-    return (SERVOS, HELD)[best] if likely[best] > 0.0 else LINES
+    moved, jumped = (found.share_of(one, result, trim, data, 1.0) for one in (bent, held))
+    if _whole_way(*jumped) > _whole_way(*moved):
+        return HELD
+    share, sd = moved
+    return LINES if share + CERTAIN_SD * sd < HALF_WAY else SERVOS
 
 
 def _whole_way(share: float, sd: float) -> float:
