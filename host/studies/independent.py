@@ -3,7 +3,8 @@
 Eight cells of gusts and calm air, ideally placed sensors. Each flight is analysed without an
 aircraft file (dimensional derivatives), with one (coefficients; every tolerance of the file and
 of the sensors is drawn), or straight by ``coefficients``. One row a flight goes to a file that a
-later run continues.
+later run continues; the last column of the table counts what stands under "trust" or "use with
+care", and how many of those hold.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ import pandas as pd
 from host.compiled import prefer_machine_code
 from host.instrument.instrument_errors import usual_errors
 from host.instrument.recording import FOREIGN
+from host.sysid.answer.marks import CAREFUL, TRUSTED
+from host.sysid.answer.verdict import verdict_of
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.identification_error import IdentificationError
 
@@ -48,7 +51,8 @@ COEFFICIENTS = {
 DIMENSIONAL, WITH_FILE, DIRECT = "dimensional", "aircraft", "coefficients"
 DRAW = 14  # of the stream that errors of an instrument are drawn from
 EVERY = {name for by in (NAMES, COEFFICIENTS) for names in by.values() for name in names}
-COLUMNS = ("cell", "seed", "name", "true", "estimate", "half_width")
+COLUMNS = ("cell", "seed", "name", "true", "estimate", "half_width", "mark")
+Found = tuple[str, float, float, float, str]
 LIMIT_MEAN = 2.0  # %, plus two standard errors of the mean
 
 
@@ -86,29 +90,30 @@ def flown(air: Air, seed: int) -> Columns:
     return fly(air, seed)[0]
 
 
-def dimensional(measured: Columns, axis: str) -> Iterator[tuple[str, float, float, float]]:
-    """Return name, truth, estimate and half-width of derivatives, without an aircraft file."""
+def dimensional(measured: Columns, axis: str) -> Iterator[Found]:
+    """Return name, truth, estimate, half-width and mark of derivatives, without an aircraft file.
+
+    Marks are those of the answer alone: no other method stands beside it here.
+    """
     # The airspeed of these flights has noise, no error of scale.
     exact = usual_errors(FOREIGN).scaled(0.0, "pitot_scale", "pitot_zero_pa", "density_share")
     [answer] = identify(dict(measured), names=(axis,), maker=FOREIGN, errors=exact)
     expected = derivatives(answer.trim.airspeed_mps)  # where the answer says that it holds
     half, result = answer.result.half_width(), answer.result
+    marks = verdict_of(answer).marks
     for name in NAMES[axis]:
-        yield name, expected[name], result.value(name), float(half[result.index(name)])
+        width = float(half[result.index(name)])
+        yield name, expected[name], result.value(name), width, marks[name]
 
 
-def with_instrument(
-    air: Air, seed: int, axis: str, analysis: str
-) -> Iterator[tuple[str, float, float, float]]:
+def with_instrument(air: Air, seed: int, axis: str, analysis: str) -> Iterator[Found]:
     """Return the same of coefficients, all errors of the instrument drawn."""
     model = DIRECT if analysis == DIRECT else axis
     return of_coefficients(answer_with_file(air, seed, model), axis, analysis)
 
 
-def of_coefficients(
-    answer: host.Identification, axis: str, analysis: str
-) -> Iterator[tuple[str, float, float, float]]:
-    """Return name, truth, value and half-width of the coefficients of an answer."""
+def of_coefficients(answer: host.Identification, axis: str, analysis: str) -> Iterator[Found]:
+    """Return name, truth, value, half-width and mark of the coefficients of an answer."""
     direct = answer.coefficients
     known: dict[str, tuple[float, float]] = {}
     if analysis != DIRECT:
@@ -118,9 +123,10 @@ def of_coefficients(
         known = {c.name: (c.value, c.half_width) for c in direct.fit.derivatives}
     if not known:
         raise IdentificationError(f"no answer of {analysis} for {axis}")
+    marks = answer.table.reset_index().set_index("name")["verdict"].to_dict()
     for name in COEFFICIENTS[axis]:
         if name in known:
-            yield name, float(getattr(TRAINER, name)), *known[name]
+            yield name, float(getattr(TRAINER, name)), *known[name], str(marks[name])
 
 
 @functools.lru_cache(maxsize=len(cells()))
@@ -153,10 +159,10 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
     """Return a line for each cell and derivative: mean error, rms, half-width, held of flights."""
     lines = [
         "cell                                derivative  mean error %   rms  half-width  over rms"
-        "  holds"
+        "  holds     relied on, hold"
     ]
     kept = [r for r in rows if r["name"] in EVERY]
-    held_all = total = 0
+    held_all = total = relied_all = relied_held_all = 0
     for cell in dict.fromkeys(r["cell"] for r in kept):
         for name in dict.fromkeys(r["name"] for r in kept):
             own = [r for r in kept if r["cell"] == cell and r["name"] == name]
@@ -165,18 +171,25 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
             )
             error, width = 100.0 * (value - truth) / np.abs(truth), 100.0 * half / np.abs(truth)
             spread = float(np.std(error, ddof=1)) / np.sqrt(len(own)) if len(own) > 1 else np.nan
-            held = int(np.sum(np.abs(error) <= width))
+            holds = np.abs(error) <= width
+            relied = np.array([r.get("mark") in (TRUSTED, CAREFUL) for r in own])
+            held, right = int(np.sum(holds)), int(np.sum(holds & relied))
             held_all, total = held_all + held, total + len(own)
+            relied_all, relied_held_all = relied_all + int(relied.sum()), relied_held_all + right
             rms = float(np.sqrt(np.mean(error**2)))
             beyond = abs(float(np.mean(error))) > LIMIT_MEAN + 2.0 * spread
             lines.append(
                 f"{cell:36s}{name:10s} {np.mean(error):+6.1f} +- {spread:3.1f}"
                 f"  {rms:5.1f}  {np.median(width):9.1f}  {np.median(width) / rms:7.1f}"
-                f"  {held:3d} of {len(own)}{'  mean beyond its limit' if beyond else ''}"
+                f"  {held:3d} of {len(own)}  {relied.sum():3d}, {right:3d}"
+                f"{'  mean beyond its limit' if beyond else ''}"
             )
     refused = sum(r["name"] == "refused" for r in rows)
     if total:
-        lines.append(f"{held_all} of {total} hold ({100.0 * held_all / total:.1f} %)")
+        lines.append(
+            f"{held_all} of {total} hold ({100.0 * held_all / total:.1f} %);"
+            f" {relied_all} relied on, of which {relied_held_all} hold"
+        )
     lines.append(f"{refused} flights refused")
     return lines
 

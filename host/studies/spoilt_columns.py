@@ -78,7 +78,7 @@ def rows_of(cell: str, seed: int) -> Iterator[dict[str, object]]:
             }
             for analysis, found in by_analysis.items():
                 for one in found:
-                    yield dict(zip(COLUMNS, (cell, seed, case, analysis, *one), strict=True))
+                    yield dict(zip(COLUMNS, (cell, seed, case, analysis, *one[:4]), strict=True))
 
 
 def without_file(
