@@ -181,3 +181,18 @@ def test_measured_power_gives_thrust_and_is_as_good_in_what_it_is_not_in() -> No
         assert abs(found.result.value(name) - true[name]) < half[name], name
     assert half["D_V"] < 0.25 * abs(true["D_V"])
     assert with_thrust(bare, None) is bare
+
+
+@pytest.mark.parametrize("method", ["flight", "output-error-white"])
+def test_what_thrust_does_is_known_per_newton(method: str) -> None:
+    """It pulls over the mass and pitches over the inertia, of a bare table too."""
+    found = answer(flown(1), method)
+    assert found.thrust is not None
+    pull, _, pitching, turning = found.thrust.rates_per_n
+    along = np.cos(found.trim.alpha_rad) / MASS_KG
+    assert pull == pytest.approx(along, rel=0.03)
+    assert pitching == pytest.approx(ARM_M / IYY_KGM2, rel=0.03)
+    assert turning == 0.0
+    of = found.model.outputs.index("ax_mps2")
+    assert found.thrust.outputs_per_n[of] == pytest.approx(1.0 / MASS_KG, rel=0.03)
+    assert answer(flown(2, stepping=False), method).thrust is None

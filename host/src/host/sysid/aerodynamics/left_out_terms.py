@@ -53,6 +53,11 @@ class LeftOutTerm:
     attenuated: bool = False
     gain: float = 1.0
 
+    @property
+    def input_name(self) -> str:
+        """What the further input is called that it makes of its column."""
+        return f"{self.column} left out of {self.row}"
+
 
 GRAVITY = LeftOutTerm("G_phi", "beta_rad", "phi_rad", "", 0.4, 0.5)  # g/V, of 10 m/s on
 # Handbooks have C_np and C_nda at a third to the whole, and a tenth to a half, of C_nr and C_ndr;

@@ -23,8 +23,8 @@ from host.sysid.aerodynamics.measured_thrust import EFFICIENCY_SHARE, thrust_col
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, Parameter
 from host.sysid.models.templates import Trim
+from host.sysid.models.thrust_column import THRUST
 
-THRUST = "thrust_n"
 THRUST_ROWS = {"airspeed_mps": "D_thrust", "alpha_rad": "Z_thrust", "q_radps": "M_thrust"}
 # Of thrust, rms: what changes less moves a model by less than its noise does.
 LEAST_SHARE = 0.03

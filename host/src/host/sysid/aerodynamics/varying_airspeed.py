@@ -189,7 +189,7 @@ class VaryingModel:
                 *(f"rest of {name}" for name in (*base.states, *self.forces)),
                 *(f"{column} by alpha on {row}" for _, row, column in second_order),
                 *(("airspeed over its trim",) if airspeed else ()),
-                *(f"{t.column} left out of {t.row}" for t in self.beside),
+                *(t.input_name for t in self.beside),
                 *(f"turning {of} on {row}" for row in turning_states for of in ("gust", *AXES)),
             ),
             B=B,

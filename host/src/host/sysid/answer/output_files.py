@@ -196,7 +196,8 @@ def _write_models(path: Path, answers: Sequence[Answer], kept: Sequence[Path]) -
     named = _named("save_model", path, answers, kept)
     for own, answer in named.items():
         with atomic_write(own) as part:
-            part.write_text(model_text(answer.model, answer.result, answer.trim), encoding="utf-8")
+            text = model_text(answer.model, answer.result, answer.trim, answer.thrust)
+            part.write_text(text, encoding="utf-8")
     return list(named)
 
 

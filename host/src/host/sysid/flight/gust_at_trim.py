@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
-from host.sysid.aerodynamics.thrust_terms import THRUST, beside_thrust, thrust_terms
+from host.sysid.aerodynamics.thrust_terms import beside_thrust, thrust_terms
 from host.sysid.estimators.filter_error_gust import GustFit, fit_with_gust
 from host.sysid.estimators.gust_delays import advance_outputs
 from host.sysid.flight.trim_departure import correct_trim_departure, without_further_inputs
@@ -15,6 +15,7 @@ from host.sysid.models.fit_result import without_parameters
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, without_inputs
 from host.sysid.models.templates import Trim
+from host.sysid.models.thrust_column import THRUST
 
 
 def fit_gust_at_trim(

@@ -28,6 +28,7 @@ from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.models.state_space_model import DelayGroup, LinearModel
 from host.sysid.models.templates import Trim
+from host.sysid.models.thrust_column import ThrustColumn
 from host.sysid.numerics.input_coherence import InputCoherence
 
 
@@ -62,6 +63,7 @@ class Answer:
     noise_covariance: Array | None = None  # of the estimate, without systematic errors
     coefficient_parts: CoefficientParts | None = None
     standard_delays: tuple[DelayGroup, ...] = STANDARD_DELAYS  # that its sensors may have
+    thrust: ThrustColumn | None = None  # that was measured and changed, beside the model
     left_out: tuple[str, ...] = ()  # motion beside a reduced template that nothing accounts for
     causes: dict[str, str] = field(default_factory=dict)  # what widens each interval most
     held_out_runs: tuple[

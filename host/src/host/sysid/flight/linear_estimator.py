@@ -259,6 +259,7 @@ class LinearEstimator:
             method=e.method,
             model=model,
             trim=e.trim,
+            thrust=None if e.departure is None else e.departure.thrust,
             condition=e.condition,
             maneuvers=e.maneuvers,
             used=tuple(m.found for m in e.used),

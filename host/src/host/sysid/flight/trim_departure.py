@@ -51,6 +51,7 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.rate_forces import has_rate_forces
 from host.sysid.models.state_space_model import LinearModel, Parameter
 from host.sysid.models.templates import Trim
+from host.sysid.models.thrust_column import ThrustColumn
 from host.sysid.numerics.output_error_problem import OutputProblem
 
 TURNED_ANGLES = ("alpha_rad", "beta_rad")
@@ -117,6 +118,15 @@ class Departure:
             tested = np.any(influence != 0.0, axis=0)  # what need not agree stays out of the test
             details["maneuver_influence"] = influence + tested * self.shares
         return replace(result, estimate=result.estimate + self.step, details=details)
+
+    @property
+    def thrust(self) -> ThrustColumn | None:
+        """What measured thrust does; None where it stayed as airspeed has it, or is not known."""
+        own = {t.input_name for t in self.varying.thrust}
+        columns = [k for k, name in enumerate(self.model.inputs) if name in own]
+        if not columns:
+            return None
+        return ThrustColumn(*(M[:, columns].sum(axis=1) for M in (self.model.B, self.model.D)))
 
     def wide_model(self, base: LinearModel) -> LinearModel:
         """Return a template with the departures as inputs, and the terms estimated along as

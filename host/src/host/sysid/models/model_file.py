@@ -78,7 +78,8 @@ _PIECE = re.compile(
 )
 KEYS = {
     "name", "states", "inputs", "outputs", "hold", "state_biases", "output_biases",
-    "initial_states", "noise", "parameters", "delays", "levers", "fit", "trim", *MATRICES,
+    "initial_states", "noise", "parameters", "delays", "levers", "fit", "trim", "thrust",
+    *MATRICES,
 }  # fmt: skip
 _TRIM = {
     "airspeed_mps": Quantity("m/s", 0.5, 2000.0, "indoor models to the X-15"),

@@ -13,10 +13,14 @@ from host.sysid.models.model_constants import OWN
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import MATRICES, LinearModel
 from host.sysid.models.templates import Trim
+from host.sysid.models.thrust_column import ThrustColumn
 
 
 def model_text(
-    model: LinearModel, result: FitResult | None = None, trim: Trim | None = None
+    model: LinearModel,
+    result: FitResult | None = None,
+    trim: Trim | None = None,
+    thrust: ThrustColumn | None = None,
 ) -> str:
     """Return a model as TOML; with a result, estimates become the start values.
 
@@ -28,6 +32,8 @@ def model_text(
         Gives start values, and a [fit] table with standard errors.
     trim : Trim, optional
         Gives a [trim] table: the condition the model is linearised about, to fly it again.
+    thrust : ThrustColumn, optional
+        Gives a [thrust] table: what measured thrust does beside the model.
     """
     if isinstance(model, NonlinearModel):
         return equation_text(model, result)
@@ -70,6 +76,8 @@ def model_text(
         lines.append("[trim]")
         for key in ("airspeed_mps", "alpha_rad", "theta_rad"):
             lines.append(f"{key} = {toml_number(getattr(trim, key))}")
+    if thrust is not None:
+        lines += thrust.lines()
     lines += delay_lines(model.delays)
     for offset in model.accelerometer_offsets:
         lines += [

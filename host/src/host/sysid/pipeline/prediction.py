@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from host.arrays import Array
+from host.sysid.aerodynamics.thrust_terms import with_thrust
 from host.sysid.answer.json_document import json_text
 from host.sysid.flight.free_simulation import frozen_at
 from host.sysid.identification_error import IdentificationError
@@ -17,6 +18,12 @@ from host.sysid.models.equation_file import KIND as EQUATIONS
 from host.sysid.models.model_file import read_model
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
 from host.sysid.models.thesis_models import model_path
+from host.sysid.models.thrust_column import (
+    THRUST,
+    THRUST_COLUMNS,
+    ThrustColumn,
+    read_thrust_column,
+)
 from host.sysid.models.toml_document import read_document
 from host.sysid.pipeline.aircraft_data import aircraft_data
 from host.sysid.pipeline.aircraft_motion import aircraft_models
@@ -28,6 +35,8 @@ from host.sysid.pipeline.notebook_pictures import Pictures
 from host.sysid.pipeline.prediction_text import simulation_document, simulation_lines
 from host.sysid.pipeline.reading_options import OfEach, joined_stretches, reading_options
 from host.sysid.pipeline.simulation import Simulation, simulate
+
+THRUST_HELD = "the model was fitted with thrust that changed; none is measured here: taken as held"
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -122,8 +131,9 @@ def predict(
     assert path is not None
     path = model_path(path)
     models, doubts = _saved_models(path)
-    late_s = _late_inputs(path)
+    late_s, thrust = _late_inputs(path), _thrust(path, models)
     signals = {name for _, m in models for name in (*m.inputs, *m.outputs)} - {CONSTANT}
+    signals |= set(THRUST_COLUMNS if thrust is not None else ())
     sources = listed_flights(flights)
     each = reading_options(
         len(sources),
@@ -154,7 +164,15 @@ def predict(
             recorded=_as_delayed(ready.flight.recorded, late_s),
             corrected=_as_delayed(ready.flight.corrected, late_s),
         )
-        found.append(simulate(models, flight, notes, constants=constants))
+        driven = models
+        if thrust is not None:
+            rotor = known.powerplant if known is not None else None
+            flight = replace(flight, corrected=with_thrust(flight.corrected, rotor))
+            if THRUST in flight.corrected:
+                driven = [(label, thrust.beside(m)) for label, m in models]
+            else:
+                notes = (*notes, THRUST_HELD)
+        found.append(simulate(driven, flight, notes, constants=constants))
     return Prediction(str(path), tuple(found), constants)
 
 
@@ -191,6 +209,14 @@ def _without_start(document: Mapping[str, object], model: LinearModel) -> list[s
     stated = given if isinstance(given, dict) else {}
     said = {n for n, v in stated.items() if not isinstance(v, dict) or "start" in v}
     return [p.name for p in model.parameters if p.start == 0.0 and p.name not in said]
+
+
+def _thrust(path: Path, models: Sequence[tuple[str, LinearModel]]) -> ThrustColumn | None:
+    """Return what measured thrust does beside a saved linear model; None where nothing is known."""
+    if read_document(path).get("kind") is not None:
+        return None
+    [(_, model)] = models
+    return read_thrust_column(path, model)
 
 
 def _late_inputs(path: Path) -> dict[str, float]:

@@ -19,10 +19,10 @@ from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import read_model
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
 from host.sysid.models.thesis_models import model_path, shipped_lines, shipped_models
+from host.sysid.models.thrust_column import THRUST_COLUMNS
 from host.sysid.pipeline.arguments import listed
 
 COEFFICIENTS = "coefficients"
-THRUST = ("thrust_n", "power_w")
 DEFAULT_MODELS = ("longitudinal", "lateral")
 # What stands in the place of a default model, and why.
 WITHOUT_AIRSPEED = (
@@ -67,7 +67,7 @@ class Models:
     def signals(self) -> tuple[str, ...]:
         """Inputs and outputs of the user's own models; thrust where it was measured."""
         own = {s for _, m in self.linear if m is not None for s in (*m.inputs, *m.outputs)}
-        return tuple(sorted((own | set(THRUST)) - {CONSTANT}))
+        return tuple(sorted((own | set(THRUST_COLUMNS)) - {CONSTANT}))
 
 
 def requested_models(given: ModelName | Iterable[ModelName] | None) -> Models:
