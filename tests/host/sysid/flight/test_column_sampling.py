@@ -27,24 +27,27 @@ NOISE = {
 }  # fmt: skip
 STEPS = {"alpha_rad": 0.1 * DEG, "theta_rad": 0.1 * DEG, "airspeed_mps": 0.5}
 SLOW = 5  # rows
+SERVO_RADPS, FINE = 46.0, 8  # it moves between the samples too
 
 
 def record(seed: int, noise: float = 1.0) -> pd.DataFrame:
     """Return 40 s of a linear aircraft with two 3-2-1-1s and a doublet, at 50 Hz."""
     model, dt_s, rows = longitudinal(TRIM), 0.02, 2000
-    t, u = dt_s * np.arange(rows), np.zeros(rows)
+    t, u = dt_s / FINE * np.arange(rows * FINE), np.zeros(rows * FINE)
     for start_s in (5.0, 18.0):
         for first_s, last_s, sign in ((0, 0.6, 1), (0.6, 1.0, -1), (1.0, 1.2, 1), (1.2, 1.4, -1)):
             u[(t > start_s + first_s) & (t <= start_s + last_s)] = sign * 3.0 * DEG
     u[(t > 30.0) & (t <= 30.4)], u[(t > 30.4) & (t <= 30.8)] = 3.0 * DEG, -3.0 * DEG
-    for k in range(1, rows):  # a servo
-        u[k] = u[k - 1] + 0.6 * (u[k] - u[k - 1])
-    still = Maneuver(dt_s, u[:, None], np.zeros((rows, len(model.outputs))))
+    left = np.exp(-SERVO_RADPS * dt_s / FINE)
+    for k in range(1, len(t)):
+        u[k] = u[k - 1] + (1.0 - left) * (u[k] - u[k - 1])
+    still = Maneuver(dt_s / FINE, u[:, None], np.zeros((len(t), len(model.outputs))))
     problem = OutputProblem(model, [still])
     theta = np.zeros(len(problem.names))
     theta[: len(model.parameters)] = [TRUE.get(p.name, 0.0) for p in model.parameters]
     found = problem.outputs(theta)
     assert found is not None
+    t, u, found = t[::FINE], u[::FINE], [found[0][:, ::FINE]]
     rng, g = np.random.default_rng(seed), 9.80665
     level = {
         "airspeed_mps": 17.0, "alpha_rad": TRIM.alpha_rad, "theta_rad": TRIM.alpha_rad,
