@@ -5,6 +5,8 @@ PYTHON := .venv/bin/python
 PIO := .venv/bin/pio
 # Runs a module of tests/chip in that folder; what it imports lies elsewhere.
 CHIP_PYTHON := PYTHONPATH=../simulator:../..:../../firmware/toolchain ../../$(PYTHON)
+# All are run: one that misses a limit does not hide the others.
+BENCHES := run identification identification_equations identification_imported after_landing
 # mkfs.vfat and fsck.vfat live where only root looks.
 export PATH := $(PATH):/usr/sbin:/sbin
 
@@ -39,11 +41,7 @@ format: setup ## rewrite C++ and Python in the house format
 	@.venv/bin/ruff format --quiet .
 
 bench: setup ## damage, speed and identification beside their peers
-	@$(PYTHON) tests/bench/run.py
-	@$(PYTHON) tests/bench/identification.py
-	@$(PYTHON) tests/bench/identification_equations.py
-	@$(PYTHON) tests/bench/identification_imported.py
-	@$(PYTHON) tests/bench/after_landing.py
+	@bad=0; for part in $(BENCHES); do $(PYTHON) tests/bench/$$part.py || bad=$$?; done; exit $$bad
 
 study: setup sitl ## tables and pictures of identification in build/study (SIZE=full: half an hour)
 	@cd host && ../$(PYTHON) -m studies ../build/study --size $(or $(SIZE),small)
