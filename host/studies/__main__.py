@@ -31,6 +31,7 @@ from studies import (
     windows,
 )
 from studies.inputs import SHAPES
+from studies.row_studies import ROW_STUDIES
 from studies.study_table import write
 
 # runs of each study: (small, full)
@@ -182,6 +183,7 @@ STUDIES: dict[str, Callable[[Path, int], list[Path]]] = {
     "i_imported_logs": study_i,
     "j_thesis_tables": study_j,
     "k_fleets": study_k,
+    **{name: study.run for name, study in ROW_STUDIES.items()},
 }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from host.arrays import Array
@@ -209,14 +209,26 @@ def windows_figure(cases: Sequence[Compared]) -> Figure:
 
 def imported_figure(found: Sequence[Estimate]) -> Figure:
     """Draw the error of every coefficient over its half-width, by the log it came from."""
-    figure = Figure(figsize=(9, 4.6))
+    over: dict[str, list[float]] = {}
+    for one in found:
+        over.setdefault(one.source, []).append((one.value - one.true) / one.half_width)
+    return intervals_figure(over)
+
+
+def intervals_figure(over: Mapping[str, Sequence[float] | Array]) -> Figure:
+    """Draw errors over their 95 % half-widths: beyond the lines an interval does not hold.
+
+    Parameters
+    ----------
+    over : mapping of str to sequence of float
+        Ratios of each group.
+    """
+    figure = Figure(figsize=(max(9.0, 2.0 + 0.22 * len(over)), 4.6))
     axis = figure.subplots()
-    sources = list(dict.fromkeys(t.source for t in found))
-    for k, source in enumerate(sources):
-        over = [(t.value - t.true) / t.half_width for t in found if t.source == source]
-        axis.plot(np.full(len(over), k), over, ".", color="C0", ms=4)
+    for k, values in enumerate(over.values()):
+        axis.plot(np.full(len(values), k), values, ".", color="C0", ms=4)
     for edge in (-1.0, 1.0):
         axis.axhline(edge, color="C3", lw=0.8, ls="--")
-    axis.set_xticks(range(len(sources)), sources, fontsize=7, rotation=40)
+    axis.set_xticks(range(len(over)), list(over), fontsize=7, rotation=40, ha="right")
     axis.set_title("error over 95 % half-width", fontsize=9)
     return figure
