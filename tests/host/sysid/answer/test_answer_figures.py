@@ -57,6 +57,7 @@ def test_angles_are_shown_in_degrees() -> None:
     label, scale = shown("q_radps")
     assert (label, round(scale * np.pi, 4)) == ("q, deg/s", 180.0)
     assert shown("az_mps2") == ("az, m/s2", 1.0)
+    assert shown("thrust_n") == ("thrust, N", 1.0)
     assert shown("CL") == ("CL", 1.0)
 
 

@@ -26,6 +26,8 @@ SHOWN_UNITS = {
     "_rad": ("deg", DEG_PER_RAD),
     "_mps2": ("m/s2", 1.0),
     "_mps": ("m/s", 1.0),
+    "_n": ("N", 1.0),
+    "_w": ("W", 1.0),
 }
 IN_A_LINE = 4  # maneuvers whose names fit side by side
 TRUSTED, REACH = 10.0, 60.0  # %, of intervals: trusted, and the end of the scale
