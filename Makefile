@@ -43,7 +43,7 @@ format: setup ## rewrite C++ and Python in the house format
 bench: setup ## damage, speed and identification beside their peers
 	@bad=0; for part in $(BENCHES); do $(PYTHON) tests/bench/$$part.py || bad=$$?; done; exit $$bad
 
-study: setup sitl ## tables and pictures of identification in build/study (SIZE=full: half an hour)
+study: setup sitl ## tables and pictures of identification in build/study, nine minutes (SIZE=full: two hours)
 	@cd host && ../$(PYTHON) -m studies ../build/study --size $(or $(SIZE),small)
 
 flight-bench: setup ## load, stack, pulse errors and losses of the Mega's image on the simulated chip
