@@ -201,7 +201,11 @@ def main(arguments: list[str] | None = None) -> int:
     prefer_machine_code()
     for name in options.only or STUDIES:
         begin = time.perf_counter()
-        paths = STUDIES[name](options.folder / name, ("small", "full").index(options.size))
+        try:
+            paths = STUDIES[name](options.folder / name, ("small", "full").index(options.size))
+        except KeyboardInterrupt:
+            sys.stderr.write(f"\nstopped in {name}; what is done stands in {options.folder}\n")
+            return int(ExitCode.INTERRUPTED)
         sys.stdout.write(
             f"{options.folder / name}: {', '.join(p.suffix[1:] for p in paths)}"
             f"  {time.perf_counter() - begin:.0f} s\n"
@@ -218,7 +222,10 @@ def run_alone() -> int:
     if "OPENBLAS_NUM_THREADS" in os.environ:
         return main()
     command = [sys.executable, "-m", "studies", *sys.argv[1:]]
-    return subprocess.run(command, env={**os.environ, "OPENBLAS_NUM_THREADS": "1"}).returncode
+    try:
+        return subprocess.run(command, env={**os.environ, "OPENBLAS_NUM_THREADS": "1"}).returncode
+    except KeyboardInterrupt:  # the child has said what stands
+        return int(ExitCode.INTERRUPTED)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from host.errors import ExitCode
+
 Row = Mapping[str, object]
 Key = tuple[object, ...]
 
@@ -94,6 +96,11 @@ def flown_rows(
         One of each flight, all of one length.
     fly : callable
         Given the entries of a key, its rows.
+
+    Raises
+    ------
+    SystemExit
+        130 after Ctrl-C; flights that are done stay in the file, whole.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     rows, keys = _read(path), list(keys)
@@ -102,11 +109,16 @@ def flown_rows(
         writer = csv.DictWriter(file, columns, restval="")
         if file.tell() == 0:  # not where a run was stopped before its first flight
             writer.writeheader()
-        for key in keys:
-            if tuple(map(str, key)) not in known:
-                writer.writerows(fly(*key))
-                file.flush()
-                print(f"\r{', '.join(map(str, key))}   ", end="", file=sys.stderr, flush=True)
+        try:
+            for key in keys:
+                if tuple(map(str, key)) not in known:
+                    found = list(fly(*key))
+                    writer.writerows(found)
+                    file.flush()
+                    print(f"\r{', '.join(map(str, key))}   ", end="", file=sys.stderr, flush=True)
+        except KeyboardInterrupt:
+            print(f"\nstopped; the next run goes on behind the rows of {path}", file=sys.stderr)
+            raise SystemExit(int(ExitCode.INTERRUPTED)) from None
     print(file=sys.stderr)
     return _read(path)
 

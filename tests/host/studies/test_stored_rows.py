@@ -1,5 +1,6 @@
 """Rows in a file: what is there is not flown again, what is missing is, whatever the order."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -8,19 +9,21 @@ from studies.stored_rows import flown_rows, seeded_run
 COLUMNS = ("air_mps", "seed", "name", "estimate")
 
 
-def test_a_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
+def test_a_run_goes_on_where_it_stopped(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     flown: list[tuple[float, int]] = []
 
-    def fly(air_mps: float, seed: int) -> list[dict[str, object]]:
-        if seed == 3:
-            raise KeyboardInterrupt
+    def fly(air_mps: float, seed: int) -> Iterator[dict[str, object]]:
+        for name in ("M_q", "M_de") if seed else ("refused",):
+            yield {"air_mps": air_mps, "seed": seed, "name": name}
+            if seed == 3:  # Ctrl-C in the middle of a flight
+                raise KeyboardInterrupt
         flown.append((air_mps, seed))
-        rows = ("M_q", "M_de") if seed else ("refused",)
-        return [{"air_mps": air_mps, "seed": seed, "name": name} for name in rows]
 
     path = tmp_path / "new" / "rows.csv"
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(SystemExit) as stopped:
         flown_rows(path, COLUMNS, [(0.5, 1), (0.5, 3)], fly)
+    assert stopped.value.code == 130
+    assert str(path) in capsys.readouterr().err
     rows = flown_rows(path, COLUMNS, [(0.0, 0), (0.5, 0), (0.5, 1)], fly)
     assert flown == [(0.5, 1), (0.0, 0), (0.5, 0)]
     assert [r["name"] for r in rows] == ["M_q", "M_de", "refused", "refused"]
