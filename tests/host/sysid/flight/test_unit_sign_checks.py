@@ -291,6 +291,18 @@ def test_degrees_everywhere_are_read_together(flight: Columns) -> None:
     assert any(f.wrong_unit and f.channels for f in findings)
 
 
+def test_a_doubt_that_another_column_explains_is_none() -> None:
+    """Angles in degrees: the airspeed beside them had looked like one in cm/s."""
+    right = fly(Air("dryden", 0.5, True, False), 21290)[0]
+    assert check(right) == []
+    in_degrees = {k: v * (DEG if k.endswith(("_rad", "_radps")) else 1.0) for k, v in right.items()}
+    assert any("airspeed_mps" in f.channels for f in check(in_degrees))
+    columns, findings = checked(in_degrees)
+    np.testing.assert_allclose(columns["alpha_rad"], right["alpha_rad"], rtol=1e-9)
+    assert "airspeed_mps" not in open_channels(findings)
+    assert "alpha_rad" in open_channels(findings)
+
+
 def faults(flight: Columns) -> Iterator[tuple[str, Columns]]:
     """Return every fault of one column that a map makes: units, twice converted, signs, swaps."""
     for name in (k for k in flight if k not in ("t_s", "bridged", "density_kgpm3")):

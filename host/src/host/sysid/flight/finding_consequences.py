@@ -47,7 +47,10 @@ def checked(
         result = reading.read(result)
         remain = {(f.check, f.channels) for f in left}
         for f in asked:
-            if (f.check, f.channels) not in remain:
+            if (f.check, f.channels) in remain:
+                continue
+            # A doubt about a column that is read as it is: the wrong unit beside it made it.
+            if f.wrong_unit or set(f.channels) & set(reading.channels):
                 settled.append(
                     replace(
                         f,
