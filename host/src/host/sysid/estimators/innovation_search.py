@@ -53,7 +53,8 @@ def noise_floor(maneuvers: Sequence[Maneuver], process: Array) -> Array:
     """Return the least logarithms of process and measurement deviations.
 
     Noise that the data do not show would decrease for ever, and the search would not end. The step
-    of the numbers is noise of step^2 / 12 in any case.
+    of the numbers is noise of step^2 / 12 in any case, and so is the least noise of a sensor whose
+    error lasts.
 
     Parameters
     ----------
@@ -65,6 +66,9 @@ def noise_floor(maneuvers: Sequence[Maneuver], process: Array) -> Array:
     steps = [m.resolution for m in maneuvers if m.resolution is not None]
     if steps:
         spread = np.maximum(spread, np.max(steps, axis=0) / np.sqrt(12.0) / NOISE_FLOOR)
+    least = [m.least_noise for m in maneuvers if m.least_noise is not None]
+    if least:
+        spread = np.maximum(spread, np.max(least, axis=0) / NOISE_FLOOR)
     return np.asarray(np.log(NOISE_FLOOR) + np.concatenate([process, np.log(spread)]))
 
 

@@ -40,6 +40,9 @@ class Maneuver:
         and what is given of such a maneuver becomes None.
     resolution : Array or None, shape (n_outputs,)
         Step of each output's numbers, 0 where none is known.
+    least_noise : Array or None, shape (n_outputs,)
+        Least deviation of each output's noise as a filter takes it, 0 where none is known: an error
+        that lasts from sample to sample passes for a sensor without noise.
 
     Raises
     ------
@@ -55,6 +58,7 @@ class Maneuver:
     name: str = "maneuver"
     sampled: BoolArray | None = None
     resolution: Array | None = None
+    least_noise: Array | None = None
 
     def __post_init__(self) -> None:
         for label in ("inputs", "outputs", "rates"):
