@@ -84,3 +84,17 @@ def test_nothing_new_moves_nothing() -> None:
     one_step = one_step_of(alone, data, TRIM)
     assert one_step is not None
     np.testing.assert_allclose(one_step.change(still, TRIM, data), 0.0, atol=1e-9)
+
+
+def test_what_other_unknowns_explain_is_known_by_its_prior() -> None:
+    """Rounding made its information negative, and its deviation no number."""
+    still, free = _models()
+    data = [_flown(free, seed) for seed in (1, 2)]
+    alone = fit("output-error-white", still, data, multiple_starts=False)
+    found = one_step_of(alone, data, TRIM)
+    assert found is not None
+    rounded = replace(found, inverse=1.1 * found.inverse)
+    other = replace(still, B=still.B.copy())  # another elevator effectiveness
+    other.B[still.states.index("q_radps"), 0] += 1.0
+    _, sd = rounded.share_of((other, data), alone, TRIM, data, 0.5)
+    assert sd == pytest.approx(0.5, rel=1e-3)

@@ -119,7 +119,9 @@ class OneStep:
         beside = [self.residuals(one, trim, data) for one, data in extended]
         score = np.zeros((len(changed), len(self.inverse)))
         link = np.zeros((len(changed), len(self.inverse), count))
-        normal, right = np.diag(np.asarray(prior_sd, dtype=np.float64) ** -2.0), np.zeros(count)
+        prior = np.diag(np.asarray(prior_sd, dtype=np.float64) ** -2.0)
+        normal: Array = np.zeros((count, count))
+        right: Array = np.zeros(count)
         for k, (r, before) in enumerate(zip(here, self.reference, strict=True)):
             own, J = self.columns[k], self.slopes[k]
             score[k, own] = -(J.T @ (r - before))
@@ -129,13 +131,15 @@ class OneStep:
                 normal += by.T @ by
                 right -= by.T @ r
         step = score @ self.inverse
-        added, covariance = np.zeros(count), np.zeros((count, count))
+        added: Array = np.zeros(count)
+        covariance: Array = np.zeros((count, count))
         # Minus inverse times cross information: the consider sensitivity (Tapley, Schutz & Born,
         # Statistical Orbit Determination, ch. 6).
         consider_sensitivity = -np.einsum("kij,il->klj", link, self.inverse)
         if count:
             whole = link.sum(axis=0)
-            covariance = np.linalg.pinv(normal - whole.T @ self.inverse @ whole, hermitian=True)
+            told = _not_negative(normal - whole.T @ self.inverse @ whole)
+            covariance = np.linalg.pinv(prior + told, hermitian=True)
             added = covariance @ (right - whole.T @ step.sum(axis=0))
             step = step + consider_sensitivity @ added
         sensitivity = self._placed(consider_sensitivity.sum(axis=0).T)
@@ -290,3 +294,12 @@ def _inverse_within(H: Array, held: BoolArray) -> Array:
     inverse /= np.outer(size, size)
     inverse[held], inverse[:, held] = 0.0, 0.0  # not rounding: a bound stays one
     return np.asarray(inverse)
+
+
+def _not_negative(information: Array) -> Array:
+    """Return what data tell beside other unknowns: where those explain all, rounding made it less
+    than nothing."""
+    size, axes = np.linalg.eigh(information)
+    if size.min(initial=0.0) >= 0.0:
+        return information
+    return np.asarray((axes * np.maximum(size, 0.0)) @ axes.T)
