@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from host.instrument.deviations import sensor_error_model
 from host.instrument.recording import FOREIGN, OWN
+from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.estimators.filter_error import fit_filter_error
 from host.sysid.estimators.gust_model import gust_model
 from host.sysid.estimators.innovation_search import noise_floor
@@ -77,12 +79,20 @@ def test_the_search_starts_above_the_least_noise() -> None:
     np.testing.assert_allclose(np.delete(found, 3), np.delete(usual, 3), rtol=1e-12)
 
 
-@pytest.mark.parametrize(("maker", "least_rad"), [(OWN, OWN_ATTITUDE_RAD), (FOREIGN, 0.0)])
-def test_only_our_own_attitude_is_known_to_be_so(maker: str, least_rad: float) -> None:
+@pytest.mark.parametrize(
+    ("maker", "known", "least_rad"),
+    [(OWN, True, OWN_ATTITUDE_RAD), (OWN, False, 0.0), (FOREIGN, True, 0.0)],
+)
+def test_only_our_own_attitude_is_known_to_be_so(maker: str, known: bool, least_rad: float) -> None:
     t = np.arange(0.0, 10.0, DT_S)
     columns = {"t_s": t} | dict.fromkeys((*MODEL.outputs, "elevator_rad"), 0.0 * t)
     window = DetectedManeuver("elevator_rad", "stretch", 1.0, 9.0, 9.0, 0.1, 1, given=True)
-    [one] = flown_maneuvers([reconstruct_flight(columns, [window], maker=maker)], [[window]])
+    instrument = sensor_error_model("ultrastick25e") if known else None
+    flight = replace(
+        reconstruct_flight(columns, [window], maker=maker),
+        compatibility=Compatibility((), {}, (), gps=False, instrument=instrument),
+    )
+    [one] = flown_maneuvers([flight], [[window]])
     least = one.cut(MODEL).least_noise
     assert least is not None
     assert dict(zip(MODEL.outputs, least, strict=True)) == {

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import AirframeData
 from host.constants import GRAVITY_MPS2
-from host.instrument.instrument_errors import usual_errors
-from host.instrument.recording import FOREIGN
 from host.sysid.aerodynamics.thrust_terms import LEAST_SHARE, THRUST_BESIDE, with_thrust
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import identify
@@ -37,7 +35,6 @@ STEPS = (
 AIRCRAFT = AirframeData(
     "jet", MASS_KG, 3e4, IYY_KGM2, 8e4, 0.0, AREA_M2, 12.5, CHORD_M, elevator_arm_m=7.0
 )
-EXACT = usual_errors(FOREIGN).scaled(0.0, "pitot_scale", "pitot_zero_pa", "density_share")
 PRINCIPAL = ("D_V", "Z_alpha", "M_alpha", "M_q", "M_de")
 
 
@@ -129,17 +126,14 @@ def flown(seed: int, *, stepping: bool = True) -> Columns:
 def answer(
     columns: Columns, method: str = "flight", airframe: AirframeData | None = None
 ) -> Answer:
-    """Return the longitudinal answer from both inputs, each with its free response.
-
-    A table of others: our own logger's attitude would not tell D_V so well.
-    """
+    """Return the longitudinal answer from both inputs, each with its free response."""
     windows = [
         DetectedManeuver("elevator_rad", "3-2-1-1", s, s + 4.9, s + 25.0, INPUT_RAD, 7)
         for s, _ in INPUTS
     ]
     return identify(
         columns, names=["longitudinal"], windows=windows, method=method, airframe=airframe,
-        with_delays=False, maker=FOREIGN, errors=EXACT,
+        with_delays=False,
     )[0]  # fmt: skip
 
 
