@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 from host.arrays import Array
 from host.compiled import prefer_machine_code
-from host.sysid.identification_error import IdentificationError
+from host.errors import IdentificationError
 from scipy import signal
 
 import host

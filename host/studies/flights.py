@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
+from host.errors import IdentificationError
 from host.instrument.deviations import sensor_error_model
 from host.sysid.answer.truth_comparison import read_truth, true_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_detection import DetectedManeuver, detect_maneuvers
-from host.sysid.identification_error import IdentificationError
 
 FIRST_SEED = 200
 OVERLAP = 0.8

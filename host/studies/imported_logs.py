@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from host.sysid.identification_error import IdentificationError
+from host.errors import IdentificationError
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.outcome.autopilot_logs import NAMES, write_autopilot_log
 from host.twin.outcome.autopilot_outputs import AIRFRAMES

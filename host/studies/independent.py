@@ -20,12 +20,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from host.compiled import prefer_machine_code
+from host.errors import IdentificationError
 from host.instrument.instrument_errors import usual_errors
 from host.instrument.recording import FOREIGN
 from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.flight.linear_estimator import identify
-from host.sysid.identification_error import IdentificationError
 
 import host
 from studies.foreign.aeroplane import TRAINER

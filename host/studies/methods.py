@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.estimators.method_registry import fit, methods
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import reference_values
 from host.sysid.models.maneuver import Maneuver
 

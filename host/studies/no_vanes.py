@@ -21,6 +21,7 @@ from host.aircraft.file import load_measured, read_document
 from host.aircraft.mass_properties import RECTANGLE
 from host.arrays import Array
 from host.compiled import prefer_machine_code
+from host.errors import IdentificationError
 from host.export.toml import dumps
 from host.instrument.instrument_errors import (
     InstrumentErrors,
@@ -30,7 +31,6 @@ from host.instrument.instrument_errors import (
 from host.instrument.recording import AUTOPILOT
 from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
-from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import aircraft_data
 from host.sysid.pipeline.flight_preparation import prepare
 from host.sysid.pipeline.identification import Identification

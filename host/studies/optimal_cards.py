@@ -16,6 +16,7 @@ from host.aircraft.file import load
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.constants import NORMAL_95
+from host.errors import IdentificationError
 from host.instrument.deviations import sensor_error_model
 from host.planning.optimal_card import optimal_card, standard_card
 from host.planning.prior_range import random_aircraft
@@ -25,7 +26,6 @@ from host.sysid.flight.even_grid import even_arrays
 from host.sysid.flight.foreign_tables import from_frame
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.recorded import recording_of_table
-from host.sysid.identification_error import IdentificationError
 from host.twin.testcard.cards import BEFORE_S, Card, Pilot, Segment, duration_s
 from host.twin.virtual import virtual_flight
 

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.live.live_stream import LiveStream
 from host.live.test_point.point_estimate import PROMISE_FLIGHTS, PointEstimate, PointEstimator
 from host.live.test_point.point_watch import PointWatch
@@ -34,7 +35,6 @@ from host.planning.point_widths import (
     test_points,
 )
 from host.sysid.flight.maneuver_detection import DetectedManeuver
-from host.sysid.identification_error import IdentificationError
 from host.twin.flight.fly import FlightRecord
 from host.twin.outcome.virtual_calibration import calibration
 from host.twin.recorder import sitl

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.estimators.method_registry import fit
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import (
     EVEN_ODDS,
     NOT_IDENTIFIABLE,

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from host.sysid.identification_error import IdentificationError
+from host.errors import IdentificationError
 
 from studies import (
     demonstration,

@@ -23,8 +23,8 @@ import numpy as np
 import pandas as pd
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
+from host.errors import IdentificationError
 from host.sysid.answer.verdict import verdict_of
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.equation_file import equations_from
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.twin.testcard.cards import Card, load

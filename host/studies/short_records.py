@@ -16,12 +16,12 @@ import numpy as np
 from host.arrays import Array
 from host.compiled import prefer_machine_code
 from host.constants import GRAVITY_MPS2
+from host.errors import IdentificationError
 from host.instrument.recording import FOREIGN
 from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_detection import DetectedManeuver
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.templates import Trim, template
 from scipy import signal
 

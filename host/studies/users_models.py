@@ -12,10 +12,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.linear_model import DEFAULT_METHOD
 from host.sysid.flight.maneuver_detection import DetectedManeuver
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import model_from
 from scipy import signal
 

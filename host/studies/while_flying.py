@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 from host.aircraft.mass_properties import airframe_data
+from host.errors import IdentificationError
 from host.live.estimates.flight_estimate import FlightEstimate, FlightEstimator
 from host.live.estimates.wanted_widths import WANTED_PERCENT
 from host.sysid.answer.truth_comparison import true_coefficients
-from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.stages import identify
 from host.twin.testcard.cards import Card, load
 

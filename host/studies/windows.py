@@ -22,6 +22,7 @@ import numpy as np
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.instrument.deviations import sensor_error_model
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
@@ -30,7 +31,6 @@ from host.sysid.flight.even_grid import even_columns
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_detection import FLYING_SHARE, detect_maneuvers
 from host.sysid.flight.maneuver_selection import SURFACES, joined_windows, select_maneuvers
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term

@@ -16,12 +16,12 @@ from pathlib import Path
 
 import numpy as np
 from host.compiled import prefer_machine_code
+from host.errors import IdentificationError
 from host.instrument.recording import FOREIGN
 from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import identify
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.numerics.input_coherence import input_coherence
 from host.sysid.numerics.output_error import minimise

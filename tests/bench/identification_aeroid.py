@@ -26,8 +26,8 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2, NORMAL_95
+from host.errors import IdentificationError
 from host.sysid.flight.maneuver_detection import DetectedManeuver
-from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import aircraft_data
 from host.sysid.pipeline.flight_preparation import prepare
 from host.sysid.pipeline.reading_options import ReadingOptions

@@ -21,9 +21,9 @@ from importlib.resources import files
 import numpy as np
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
+from host.errors import IdentificationError
 from host.files.user_text import parse_toml
 from host.sysid import Maneuver, fit
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.equation_file import equations_from
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.numerics.nonlinear_problem import output_problem

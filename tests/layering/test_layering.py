@@ -471,7 +471,7 @@ ALLOWED = [
     ),
     (
         "host/src/host/planning/card_planning.py",
-        "from host.twin.virtual import a\nimport host.sysid.identification_error",
+        "from host.twin.virtual import a\nimport host.sysid.models.maneuver",
     ),
     (
         "host/src/host/sysid/models/state_space_model.py",

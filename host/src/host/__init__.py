@@ -8,9 +8,8 @@
 
 TYPE_CHECKING = False  # of `typing`, whose import takes longer than the rest of this file
 if TYPE_CHECKING:
-    from host.errors import CalibrationError, LogError, NotALogError
+    from host.errors import CalibrationError, IdentificationError, LogError, NotALogError
     from host.log import FlightLog, read_log
-    from host.sysid.identification_error import IdentificationError
     from host.sysid.pipeline.identification import Identification
     from host.sysid.pipeline.prediction import Prediction, predict
     from host.sysid.pipeline.stages import identify
@@ -36,7 +35,7 @@ _HOMES = {
     "CalibrationError": "host.errors",
     "FlightLog": "host.log",
     "Identification": "host.sysid.pipeline.identification",
-    "IdentificationError": "host.sysid.identification_error",
+    "IdentificationError": "host.errors",
     "LogError": "host.errors",
     "NotALogError": "host.errors",
     "Prediction": "host.sysid.pipeline.prediction",

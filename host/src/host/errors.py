@@ -30,6 +30,10 @@ class UsageError(HostError):
     exit_code = ExitCode.USAGE
 
 
+class IdentificationError(UsageError):
+    """Data, a model or an aircraft that nothing can be identified from."""
+
+
 class CalibrationError(UsageError):
     """A calibration file that cannot be read or does not fit."""
 

@@ -17,8 +17,8 @@ from host.aircraft.linearisation import linear_aircraft_derivatives, linearise, 
 from host.aircraft.rigid_body import run
 from host.aircraft.trim import solve
 from host.cli import main
+from host.errors import IdentificationError
 from host.planning.identified_aircraft import is_model, with_models
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_text import model_text
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim, template

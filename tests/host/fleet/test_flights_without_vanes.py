@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 from host.constants import NORMAL_95
+from host.errors import IdentificationError
 from host.fleet.flight_task import DEFAULT_MODELS
 from host.fleet.tasks.flight_identification import flight_row
 from host.sysid.coefficients import coefficient_model
-from host.sysid.identification_error import IdentificationError
 
 import host
 from tests.host.readers.autopilot_flights import write

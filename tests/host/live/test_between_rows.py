@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.aircraft.linear_aircraft import load
+from host.errors import IdentificationError
 from host.live.test_point.between_rows import drawn_rows, finer
 from host.planning.aircraft_response import STEP_S, AircraftResponse
 from host.sysid.compatibility.servo_response import servo_response
-from host.sysid.identification_error import IdentificationError
 from host.twin.testcard.cards import Segment
 from host.twin.testcard.input_shapes import STEPS, staircase
 from numpy.typing import NDArray

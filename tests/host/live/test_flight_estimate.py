@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.errors import IdentificationError
 from host.live.estimates import flight_estimate
 from host.live.estimates.estimate_worker import EstimateWorker
 from host.live.estimates.flight_estimate import FlightEstimator
@@ -17,7 +18,6 @@ from host.planning.point_widths import PointPromise, point_derivatives
 from host.planning.predicted_widths import PredictedWidth
 from host.sysid.flight.maneuver_detection import DetectedManeuver, detect_maneuvers
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
-from host.sysid.identification_error import IdentificationError
 from host.twin.testcard.cards import Card, load
 from studies.radio_flights import RadioFlight, after_each_point, lost_in_bursts, radio_flight
 

@@ -10,13 +10,13 @@ import pandas as pd
 import pytest
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.cli import main
+from host.errors import IdentificationError
 from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
 from host.sysid.compatibility.position_correction import transfer_to_cg
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_detection import detect_maneuvers, grade
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import read_model
 from host.sysid.models.templates import Trim, longitudinal
 from host.sysid.numerics.output_error_problem import OutputProblem

@@ -21,8 +21,8 @@ from host.aircraft.linearisation import linearise, modes
 from host.aircraft.mode_names import DUTCH_ROLL, SHORT_PERIOD
 from host.aircraft.trim import solve
 from host.constants import GRAVITY_MPS2, NORMAL_95
+from host.errors import IdentificationError
 from host.sysid.estimators.start_values import start_values
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim as Condition

@@ -19,6 +19,7 @@ from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.constants import NORMAL_95
+from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
@@ -29,7 +30,6 @@ from host.sysid.flight.foreign_tables import from_frame
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.recorded import recording_of_table
-from host.sysid.identification_error import IdentificationError
 from host.twin.testcard.cards import Card
 from host.twin.virtual import virtual_flight
 

@@ -13,7 +13,7 @@ from host.arrays import Array
 from host.decode.decoding import finite, pick
 from host.decode.log_summary import summarise
 from host.decode.summary_text import lines
-from host.errors import HostError, NotALogError, UsageError
+from host.errors import HostError, IdentificationError, NotALogError, UsageError
 from host.log import FlightLog, read_log
 from host.log.source import check_source
 from host.original.row_summary import row_lines, summarise_rows
@@ -39,7 +39,6 @@ from host.sysid.flight.maneuver_detection import (
     detect_maneuvers,
     grade,
 )
-from host.sysid.identification_error import IdentificationError
 from host.text import shown
 
 _HEAD_BYTES = 4096

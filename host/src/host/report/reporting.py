@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from host.aircraft.prior.aircraft_prior import has_coefficients
-from host.errors import HostError, UsageError
+from host.errors import HostError, IdentificationError, UsageError
 from host.files.user_text import read_text
 from host.original.rows import looks_like_rows
 from host.preflight.preflight_sheet import sheet_beside, sheet_lines
@@ -19,7 +19,6 @@ from host.report.provenance import hashes, versions
 from host.report.report_page import ReportParts, report_page
 from host.report.shown_flight import ShownFlight
 from host.sysid.flight.foreign_tables import TEXT_KINDS
-from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.stages import identify
 
 if TYPE_CHECKING:

@@ -106,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
     """Identify and print the answer; messages name options where the library names arguments."""
     # The matrices are small: threads of BLAS only wait for each other (28 s against 5 measured).
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from host.sysid.identification_error import IdentificationError
+    from host.errors import IdentificationError
     from host.sysid.pipeline.arguments import option_words
 
     try:

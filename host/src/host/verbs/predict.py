@@ -48,12 +48,11 @@ def run(args: argparse.Namespace) -> int:
     """Predict and print; messages name options where the library names arguments."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.aircraft.origin import announce_aircraft
-    from host.errors import ExitCode
+    from host.errors import ExitCode, IdentificationError
     from host.readers.autopilot_flight import chosen_sensors
     from host.sysid.answer.output_files import OutputPaths, check_outputs
     from host.sysid.flight.data_finding import check_lines
     from host.sysid.flight.shipped_maps import LIST, map_lines
-    from host.sysid.identification_error import IdentificationError
     from host.sysid.models.thesis_models import shipped_lines
     from host.sysid.pipeline.arguments import option_words
     from host.sysid.pipeline.prediction import predict

@@ -107,10 +107,9 @@ def run(args: argparse.Namespace) -> int:
     # The matrices are small: threads of BLAS only wait for each other (28 s against 5 measured).
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.aircraft.origin import announce_aircraft
-    from host.errors import ExitCode
+    from host.errors import ExitCode, IdentificationError
     from host.readers.autopilot_flight import chosen_sensors
     from host.report.reporting import ReportRequest, write_report
-    from host.sysid.identification_error import IdentificationError
     from host.sysid.pipeline.arguments import option_words
     from host.terminal import command_line
     from host.text import shown

@@ -10,6 +10,7 @@ from host.aircraft.file import load
 from host.aircraft.local_derivatives import coefficients as about_cg
 from host.aircraft.mass_properties import Condition, airframe_data
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.instrument.deviations import sensor_error_model
 from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
 from host.sysid.aerodynamics.derivative_conversion import (
@@ -20,7 +21,6 @@ from host.sysid.aerodynamics.derivative_conversion import (
     to_coefficients,
     to_derivatives,
 )
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.state_space_model import free_model
 

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from host.errors import IdentificationError
 from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.varying_airspeed import VaryingModel
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.state_space_model import without_outputs
 from host.sysid.models.templates import Trim, template
 from studies.gusts import AXES, DT_S, gusty_aircraft

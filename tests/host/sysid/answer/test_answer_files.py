@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.cli import main
+from host.errors import IdentificationError
 from host.sysid.answer.atomic_files import atomic_write
 from host.sysid.answer.mat_file import labels, mat_name, write_mat
 from host.sysid.answer.output_files import OutputPaths, check_outputs
@@ -16,7 +17,6 @@ from host.sysid.answer.simulators.forms import write_form
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import identify
-from host.sysid.identification_error import IdentificationError
 from scipy import io
 
 

@@ -21,11 +21,11 @@ import pytest
 from host.aircraft.airframe import Airframe
 from host.aircraft.file import load
 from host.aircraft.local_derivatives import coefficients
+from host.errors import IdentificationError
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.answer.aircraft_export import save_aircraft
 from host.sysid.answer.output_files import OutputPaths, check_outputs
 from host.sysid.answer.simulators.forms import write_form
-from host.sysid.identification_error import IdentificationError
 
 from tests.host.sysid.answer.jsbsim_air import JSBSIM_AIR
 

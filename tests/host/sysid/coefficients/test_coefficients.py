@@ -9,6 +9,7 @@ from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.constants import NORMAL_95
+from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, deviations, sensor_error_model
 from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
@@ -17,7 +18,6 @@ from host.sysid.coefficients.window_spectra import Window, window_transform
 from host.sysid.compatibility.inverse_sensor_model import Record, apply_sensor_errors, usable_length
 from host.sysid.flight.even_grid import even_columns
 from host.sysid.flight.maneuver_detection import DetectedManeuver
-from host.sysid.identification_error import IdentificationError
 from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight
 from studies.flights import PRINCIPAL, Tally

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.coefficients.equation_blocks import (
     EquationBlock,
     EquationSpectra,
@@ -21,7 +22,6 @@ from host.sysid.coefficients.window_spectra import (
     window_transform,
 )
 from host.sysid.compatibility.inverse_sensor_model import Spectrum
-from host.sysid.identification_error import IdentificationError
 
 POSITIONS = {"Cm": np.array([0, 1]), "w": np.zeros(0, dtype=np.int64)}
 TERMS, GUSTS, ERRORS = 2, 3, 4  # gusts of one window

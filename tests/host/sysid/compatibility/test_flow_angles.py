@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.errors import IdentificationError
 from host.sysid.compatibility.flow_angles import FlowAngles, flying, reconstruct_flow_angles
 from host.sysid.compatibility.linear_smoother import Step, smooth
 from host.sysid.compatibility.reconstruction import Compatibility
-from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import aircraft_data
 from host.sysid.pipeline.flight_preparation import PreparedFlight, prepare
 from host.sysid.pipeline.reading_options import ReadingOptions

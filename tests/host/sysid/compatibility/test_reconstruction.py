@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import airframe_data
 from host.constants import GRAVITY_MPS2, NORMAL_95
+from host.errors import IdentificationError
 from host.instrument.deviations import sensor_error_model
 from host.sysid.compatibility.flight_path import (
     AIR,
@@ -30,7 +31,6 @@ from host.sysid.compatibility.reconstruction import (
 )
 from host.sysid.compatibility.sensor_dynamics import vane_delay_of
 from host.sysid.compatibility.strapdown import rotation, strapdown
-from host.sysid.identification_error import IdentificationError
 from host.sysid.numerics.output_error_problem import Response
 from host.twin.flight.fly import FlightRecord
 from host.twin.sensors.sensor_delays import FILTERS, sensor_delays

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from host.errors import IdentificationError
 from host.sysid import LinearModel, Maneuver, Parameter, Term, fit
-from host.sysid.identification_error import IdentificationError
 from host.sysid.numerics.coloured_residuals import coloured_score_covariance
 from host.sysid.numerics.differentiation import (
     bandwidth_hz,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.estimators.method_registry import fit
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.equation_file import equations_from
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model_file import model_from

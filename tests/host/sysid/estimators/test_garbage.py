@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from host.errors import IdentificationError
 from host.sysid import Maneuver, fit, methods
-from host.sysid.identification_error import IdentificationError
 from studies.aircraft import navion_structured
 from studies.data import noisy
 

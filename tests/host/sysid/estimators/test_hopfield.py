@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from host.errors import IdentificationError
 from host.sysid import fit
 from host.sysid.estimators.hopfield import (
     LAMBDA,
@@ -11,7 +12,6 @@ from host.sysid.estimators.hopfield import (
     line_search,
     network,
 )
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import thesis_program_error_percent
 from host.sysid.numerics.output_error_problem import OutputProblem
 from studies.aircraft import navion_free

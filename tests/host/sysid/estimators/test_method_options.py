@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.cli import main
+from host.errors import IdentificationError
 from host.sysid import fit
 from host.sysid.estimators.hopfield import line_search, network
 from host.sysid.estimators.method_options import check_options, options_of, read_options
-from host.sysid.identification_error import IdentificationError
 from scipy.signal import lsim
 from studies.aircraft import navion_free
 from studies.data import with_rates

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.estimators import multistart as searching
 from host.sysid.estimators.homotopy import homotopy_start, stabilised_model
 from host.sysid.estimators.multistart import multistart, white_cost
 from host.sysid.estimators.start_values import start_values
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, free_model
 from host.sysid.numerics.output_error import Optimum, minimise

@@ -4,10 +4,10 @@ import dataclasses
 
 import numpy as np
 import pytest
+from host.errors import IdentificationError
 from host.sysid import Maneuver, Parameter, fit
 from host.sysid.estimators.output_error_fit import fit_output_error
 from host.sysid.estimators.start_values import start_values
-from host.sysid.identification_error import IdentificationError
 from host.sysid.numerics.output_error import covariance_of_free, minimise
 from host.sysid.numerics.output_error_problem import OutputProblem
 from scipy import optimize

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.instrument.deviations import unknown_sensors
 from host.instrument.recording import Recording
 from host.instrument.servo_prior import ServoPrior, servo_prior
@@ -21,7 +22,6 @@ from host.sysid.estimators.servo_parameters import (
     considered_servo,
     estimate_servo,
 )
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.estimators import filter_error
 from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model_file import model_from
 from host.sysid.models.state_space_model import LinearModel

@@ -7,10 +7,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.cli import main
+from host.errors import IdentificationError
 from host.sysid.flight.data_finding import CHECKS, accepted_checks, open_channels
 from host.sysid.flight.finding_consequences import checked
 from host.sysid.flight.unit_sign_checks import check
-from host.sysid.identification_error import IdentificationError
 
 import host
 from tests.host.logs import ROOT

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.cli import main
+from host.errors import IdentificationError
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_detection import AXES, detect_maneuvers, grade
@@ -18,7 +19,6 @@ from host.sysid.flight.maneuver_selection import (
     overlap_notes,
     select_maneuvers,
 )
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import model_from
 
 import host

@@ -10,9 +10,9 @@ import pandas as pd
 import pytest
 from host.cli import main
 from host.constants import GRAVITY_MPS2
+from host.errors import IdentificationError
 from host.people_units import people_name
 from host.sysid.flight.flight_tables import read_columns
-from host.sysid.identification_error import IdentificationError
 from host.twin.virtual import virtual_flight
 from scipy.signal import lsim
 from studies.foreign.flight import Air, derivatives, fly

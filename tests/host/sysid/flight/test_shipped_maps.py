@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.cli import main
+from host.errors import IdentificationError
 from host.sysid.flight.flight_tables import read_flight_columns
 from host.sysid.flight.shipped_maps import shipped_maps
-from host.sysid.identification_error import IdentificationError
 from scipy import io
 
 THOR = Path(__file__).parents[3] / "data/thor75/flight75_240_270.csv"

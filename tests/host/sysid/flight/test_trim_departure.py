@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.aircraft.powerplant import powerplant
+from host.errors import IdentificationError
 from host.instrument.deviations import unknown_sensors
 from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
 from host.sysid.answer.truth_comparison import true_coefficients
@@ -21,7 +22,6 @@ from host.sysid.flight.linear_model import imu_place_m, without_attitude
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.flight.reconstructed_flight import flown_maneuvers, reconstruct_flight
 from host.sysid.flight.trim_departure import spin_of
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.models.templates import Trim, template

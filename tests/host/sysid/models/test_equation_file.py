@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.errors import IdentificationError
 from host.sysid.estimators.output_error_fit import fit_output_error
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.equation_text import equation_text
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model_file import read_model

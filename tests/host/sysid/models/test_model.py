@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 from host.constants import GRAVITY_MPS2
+from host.errors import IdentificationError
 from host.sysid import LinearModel, Maneuver, Parameter, Term
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.modal_analysis import longitudinal_names
 from host.sysid.models.model_file import model_from, parse_entry, read_model
 from host.sysid.models.model_text import model_text

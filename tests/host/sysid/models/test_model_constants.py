@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from host.errors import IdentificationError
 from host.sysid import Maneuver, fit
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.flight.free_simulation import frozen_at
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import model_from, read_model
 from host.sysid.models.model_text import model_text
 from host.sysid.numerics.output_error_problem import OutputProblem

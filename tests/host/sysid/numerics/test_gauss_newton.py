@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from host.arrays import Array, BoolArray
-from host.sysid.identification_error import IdentificationError
+from host.errors import IdentificationError
 from host.sysid.numerics.gauss_newton import Objective, free_of_bounds, gauss_newton
 from scipy import optimize
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from host.errors import IdentificationError
 from host.sysid.answer.output_files import OutputPaths
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model_file import read_model
 from host.sysid.numerics.nonlinear_problem import output_problem

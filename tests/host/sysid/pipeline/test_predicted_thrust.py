@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from host.sysid.identification_error import IdentificationError
+from host.errors import IdentificationError
 from host.sysid.models.model_file import model_from, read_model
 from host.sysid.models.model_text import model_text
 from host.sysid.models.thrust_column import ThrustColumn, read_thrust_column

@@ -16,7 +16,7 @@ import numpy as np
 from host.aircraft.file import load_measured
 from host.aircraft.gains import dimensional_name
 from host.constants import GRAVITY_MPS2
-from host.errors import HostError
+from host.errors import HostError, IdentificationError
 from host.fleet.flight_task import DEFAULT_MODELS, IDENTIFIED, described
 from host.fleet.sources.flight_files import is_address, opened
 from host.fleet.statistics.watched_quantities import LAG_S
@@ -31,7 +31,6 @@ from host.sysid.answer.feedback_pairs import feedback_of
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
 from host.sysid.compatibility.sensor_dynamics import SERVO_DELAY
 from host.sysid.flight.data_finding import finding_document, open_channels
-from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.identification import Identification
 from host.sysid.pipeline.stages import identify
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel
 from host.log import read_log
 from host.planning.next_point import INPUT_NAMES, KnownWidth
@@ -26,7 +27,6 @@ from host.sysid.compatibility.servo_response import surface_positions
 from host.sysid.flight.flight_tables import FlightColumns, read_flight_columns
 from host.sysid.flight.maneuver_detection import DetectedManeuver, detect_maneuvers
 from host.sysid.flight.reconstructed_flight import maneuver_name, reconstruct_flight
-from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import AircraftData, aircraft_data
 from host.sysid.pipeline.surface_travel import with_surface_angles
 from host.twin.testcard.cards import Segment

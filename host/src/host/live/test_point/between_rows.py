@@ -17,11 +17,11 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.physical.sampling import GAP_FACTOR
 from host.planning.aircraft_response import STEP_S, AircraftResponse
 from host.sysid.compatibility.linear_smoother import Step, smooth
 from host.sysid.compatibility.servo_response import servo_response
-from host.sysid.identification_error import IdentificationError
 from host.twin.testcard.cards import Segment
 
 FEWEST = 30  # rows: 1.5 s of the radio

@@ -25,8 +25,8 @@ from host.aircraft.gains import (
 from host.aircraft.mass_properties import AirframeData, Condition
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
+from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, deviations
-from host.sysid.identification_error import IdentificationError
 
 CONSIDERED_ERRORS = (
     "mass_share", "ixx_share", "iyy_share", "izz_share", "cg_x_m", "cg_z_m",

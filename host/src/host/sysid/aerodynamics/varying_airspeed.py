@@ -20,9 +20,9 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
+from host.errors import IdentificationError
 from host.sysid.aerodynamics.gust_reckoning import AXES, gust_motion, turning
 from host.sysid.aerodynamics.left_out_terms import LeftOutTerm, acting_terms
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
 from host.sysid.models.templates import Trim, template

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from host.errors import IdentificationError
 from host.export.unfinished import unfinished
-from host.sysid.identification_error import IdentificationError
 
 LONGEST_NAME = 100  # characters; file systems take 255 bytes
 

@@ -16,6 +16,7 @@ import numpy as np
 from host.aircraft.mass_properties import Condition, airframe_data
 from host.aircraft.prior.prior_file import read_prior
 from host.constants import NORMAL_95
+from host.errors import IdentificationError
 from host.files.quantities import Quantity
 from host.files.user_text import shown
 from host.instrument.deviations import sensor_error_model
@@ -31,7 +32,6 @@ from host.sysid.aerodynamics.derivative_conversion import (
     to_derivatives,
 )
 from host.sysid.answer.parameter_units import parameter_unit
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import read_model, read_trim
 from host.sysid.models.templates import Trim, template
 from host.sysid.models.toml_document import read_document

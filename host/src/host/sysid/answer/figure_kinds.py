@@ -11,9 +11,9 @@ import numpy as np
 
 from host.arrays import Array
 from host.constants import DEG_PER_RAD
+from host.errors import IdentificationError
 from host.extras import install_hint
 from host.sysid.answer.atomic_files import atomic_write
-from host.sysid.identification_error import IdentificationError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

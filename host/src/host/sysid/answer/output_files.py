@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.extras import install_hint
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.atomic_files import atomic_write, check_destination, file_names
@@ -17,7 +18,6 @@ from host.sysid.answer.settling_history import has_history, write_history
 from host.sysid.answer.simulators.forms import CONTROL, FORMS, files_of, form_of, write_form
 from host.sysid.estimators.method_options import SETTLING
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.identification_error import IdentificationError
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer

@@ -18,10 +18,10 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
+from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel
 from host.sysid.coefficients.aero_equations import FlightHistory
 from host.sysid.compatibility.inverse_sensor_model import ATTITUDE_CROSSOVER_RADPS, Record
-from host.sysid.identification_error import IdentificationError
 from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.recursion import simulate
 

@@ -16,6 +16,7 @@ from host.aircraft.powerplant import (
 )
 from host.arrays import Array
 from host.constants import NORMAL_95
+from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.coefficients.coefficient_fit import METHOD, CoefficientFit
@@ -45,7 +46,6 @@ from host.sysid.flight.reconstructed_flight import (
     maneuver_name,
     reconstruct_flight,
 )
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.consider_covariance import dominant_error_source
 from host.sysid.models.modal_analysis import Mode
 

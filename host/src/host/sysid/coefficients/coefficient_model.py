@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.identification_error import IdentificationError
+from host.errors import IdentificationError
 from host.sysid.models.toml_document import read_document
 
 SIGNALS = ("alpha", "beta", "p", "q", "r", "de", "da", "dr", "V")

@@ -18,6 +18,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, deviations
 from host.sysid.coefficients.auxiliary_model import simulate_noise_free
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
@@ -50,7 +51,6 @@ from host.sysid.coefficients.slow_gusts import gust_information, gust_regressors
 from host.sysid.coefficients.trim_derivatives import DerivativesAtTrim
 from host.sysid.coefficients.window_spectra import ResidualSpectra, Window, residual_spectra
 from host.sysid.compatibility.inverse_sensor_model import decimate, usable_length
-from host.sysid.identification_error import IdentificationError
 
 # Rounds with the coefficients alone, then with sensor errors and slow gusts.
 COEFFICIENT_ROUNDS, JOINT_ROUNDS = 3, 2

@@ -17,6 +17,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.constants import NORMAL_95
+from host.errors import IdentificationError
 from host.sysid.coefficients.coefficient_fit import (
     CoefficientFit,
     CoefficientHistory,
@@ -25,7 +26,6 @@ from host.sysid.coefficients.coefficient_fit import (
     ThrustEffect,
 )
 from host.sysid.coefficients.deletion_diagnostics import CrossValidation
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.numerics.maneuver_agreement import scatter_test
 

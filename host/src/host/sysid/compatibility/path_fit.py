@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.compatibility.flight_path import (
     AIR,
     DELAY_DIFFERENCE,
@@ -25,7 +26,6 @@ from host.sysid.compatibility.flight_path import (
     PLACES,
     PathProblem,
 )
-from host.sysid.identification_error import IdentificationError
 from host.sysid.numerics.ar_noise import ArNoise, fit_ar, lagged_moments
 
 AR_ORDER = 2  # of the residuals: a gust and a sensor

@@ -10,6 +10,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array, BoolArray
+from host.errors import IdentificationError
 from host.instrument.deviations import (
     SensorErrorModel,
     deviations,
@@ -37,7 +38,6 @@ from host.sysid.compatibility.gps_fixes import gps_fixes
 from host.sysid.compatibility.inverse_sensor_model import SLIDING_RADPS
 from host.sysid.compatibility.position_correction import transfer_to_cg
 from host.sysid.compatibility.strapdown import rotation
-from host.sysid.identification_error import IdentificationError
 from host.sysid.numerics.differentiation import local_polynomial
 
 BLOCK_S = 0.05  # samples are averaged over this: the motion of a trainer is far below 10 Hz

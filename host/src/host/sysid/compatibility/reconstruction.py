@@ -17,6 +17,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2, NORMAL_95
+from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel
 from host.people_units import people_name
 from host.sysid.compatibility.calibration_consistency import (
@@ -31,7 +32,6 @@ from host.sysid.compatibility.path_preparation import (
     prior,
     vane_delay_by_file,
 )
-from host.sysid.identification_error import IdentificationError
 
 # Posterior over prior deviation below which the data inform an error; above, the calibration does.
 POSTERIOR_PRIOR_RATIO = 0.7

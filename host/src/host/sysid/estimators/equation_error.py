@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array, IntArray
+from host.errors import IdentificationError
 from host.sysid.estimators.regression import (
     NO_EXCITATION,
     RegressionEquation,
@@ -18,7 +19,6 @@ from host.sysid.estimators.regression import (
     regression_equations,
     solve_least_squares,
 )
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel

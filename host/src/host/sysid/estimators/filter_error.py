@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.estimators.hac_inflation import hac_inflation, inflation_lines
 from host.sysid.estimators.innovation_search import InnovationObjective, first_noise, noise_floor
 from host.sysid.estimators.noise_model_comparison import compare_noise_models
 from host.sysid.estimators.start_values import start_values
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel

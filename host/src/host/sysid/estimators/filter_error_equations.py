@@ -11,12 +11,12 @@ import numpy as np
 
 from host.arrays import Array
 from host.compiled import has_compiler
+from host.errors import IdentificationError
 from host.extras import install_hint
 from host.sysid.estimators.filter_error import MAX_ITERATIONS
 from host.sysid.estimators.innovation_search import InnovationObjective, first_noise, noise_floor
 from host.sysid.estimators.noise_model_comparison import compare_noise_models
 from host.sysid.estimators.output_error_fit import fit_output_error
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel

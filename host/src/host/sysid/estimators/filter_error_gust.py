@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.estimators.filter_error import fit_filter_error, near_its_optimum
 from host.sysid.estimators.gust_delays import CALM_MPS, advance_outputs, estimate_delays
 from host.sysid.estimators.gust_model import ROLL_GUST, gust_deviation_mps, gust_model
@@ -17,7 +18,6 @@ from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.noise_model_comparison import DECISIVE, bayes_criterion
 from host.sysid.estimators.output_error_fit import NO_CONVERGENCE
 from host.sysid.estimators.start_values import start_values_of
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult, without_parameters
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.rate_forces import by_prior

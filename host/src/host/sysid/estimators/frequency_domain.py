@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.estimators.regression import solve_normal_equations
 from host.sysid.estimators.start_values import start_values_of
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel

@@ -20,10 +20,10 @@ import numpy as np
 
 from host.arrays import Array
 from host.constants import NORMAL_95
+from host.errors import IdentificationError
 from host.sysid.estimators.filter_error import fit_filter_error, near_its_optimum
 from host.sysid.estimators.gust_model import VANES, gust_deviation_mps, gust_model
 from host.sysid.estimators.gust_penetration import PREFIX, with_gust_penetration
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.rate_forces import has_rate_forces

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from host.errors import IdentificationError
 from host.sysid.estimators.gust_penetration import GUST_LAG, ROLL_LAG, penetration_name
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
 

@@ -22,9 +22,9 @@ import numpy as np
 
 from host.arrays import Array
 from host.compiled import compiled
+from host.errors import IdentificationError
 from host.sysid.estimators.equation_error import fit_equation_error
 from host.sysid.estimators.regression import normal_equations, regression_equations
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import thesis_program_error_percent
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver

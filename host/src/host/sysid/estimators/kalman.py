@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.estimators.start_values import start_values_of
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
+from host.errors import IdentificationError
 from host.sysid.estimators.kalman import (
     INITIAL_RELATIVE_SD,
     PASSES,
@@ -16,7 +17,6 @@ from host.sysid.estimators.kalman import (
     filter_result,
     noise_deviation,
 )
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel

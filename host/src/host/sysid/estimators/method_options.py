@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from host.errors import IdentificationError
 from host.files.quantities import Quantity
 from host.files.user_text import shown
-from host.sysid.identification_error import IdentificationError
 
 STARTS = ("least-squares", "model", "zero")
 NETWORK = ("lambda", "rho", "iterations", "start")

@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.estimators.homotopy import homotopy_start
 from host.sysid.estimators.kalman import noise_deviation
 from host.sysid.estimators.regression import (
@@ -22,7 +23,6 @@ from host.sysid.estimators.regression import (
     regression_equations,
     solve_least_squares,
 )
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import CONDITION_LIMIT
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel

@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.estimators.output_error_fit import fit_output_error
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver, measurements
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.estimators.coherence_inflation import inflate_by_coherence
 from host.sysid.estimators.output_error_ar_noise import (
     HIGHEST_ORDER,
@@ -15,7 +16,6 @@ from host.sysid.estimators.output_error_ar_noise import (
     refit_beside_inputs,
 )
 from host.sysid.estimators.start_values import start_values
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import linalg
 
 from host.arrays import Array, IntArray
-from host.sysid.identification_error import IdentificationError
+from host.errors import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.differentiation import (

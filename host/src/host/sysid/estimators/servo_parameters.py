@@ -22,8 +22,8 @@ import numpy as np
 
 from host.arrays import Array
 from host.constants import NORMAL_95
+from host.errors import IdentificationError
 from host.instrument.servo_prior import ServoPrior
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver

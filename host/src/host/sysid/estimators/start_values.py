@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.estimators.regression import regression_equations, solve_least_squares
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.nonlinear_problem import NonlinearProblem, output_problem

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.estimators.filter_error import near_its_optimum
 from host.sysid.estimators.filter_error_gust import SLOW_IN_CALM, fit_with_gust
 from host.sysid.estimators.gust_delays import advance_outputs
@@ -21,7 +22,6 @@ from host.sysid.estimators.gust_model import VANES
 from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.noise_model_comparison import bayes_criterion
 from host.sysid.estimators.output_error_fit import sample_periods
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from host.sysid.identification_error import IdentificationError
+from host.errors import IdentificationError
 
 MOST_NODES = 12_000  # six degrees of freedom with all slopes: about 2000
 LARGEST_EXPONENT = 100.0

@@ -24,12 +24,12 @@ from pathlib import Path
 
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2, RAD_PER_DEG
+from host.errors import IdentificationError
 from host.files.quantities import Quantity
 from host.files.user_text import read_toml
 from host.instrument.recording import SURFACES
 from host.near_names import like
 from host.sysid.flight.shipped_maps import is_shipped, map_file
-from host.sysid.identification_error import IdentificationError
 
 DEG, FOOT, POUND_PA = RAD_PER_DEG, 0.3048, 6894.757
 # What a column of ours may come in, by the end of its name.

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.compatibility.servo_response import behind_servos
 from host.sysid.estimators.filter_error_gust import fit_gust_state
 from host.sysid.estimators.method_registry import fit
@@ -19,7 +20,6 @@ from host.sysid.estimators.servo_parameters import (
 from host.sysid.estimators.start_values import start_values_of
 from host.sysid.flight.first_departures import remove_departures
 from host.sysid.flight.reconstructed_flight import FlownManeuver, ReconstructedFlight
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel

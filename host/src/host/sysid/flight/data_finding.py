@@ -18,7 +18,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from host.sysid.identification_error import IdentificationError
+from host.errors import IdentificationError
 
 # Every check and what it compares.
 CHECKS = {

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.flight.maneuver_detection import grade
 from host.sysid.flight.maneuver_selection import HELD_OUT_FROM, SURFACES, joined_windows
 from host.sysid.flight.reconstructed_flight import (
@@ -15,7 +16,6 @@ from host.sysid.flight.reconstructed_flight import (
     ReconstructedFlight,
     flown_maneuvers,
 )
-from host.sysid.identification_error import IdentificationError
 
 WEAK_GRADE = 0.2
 # Over within 3 s of an input: what follows is the slow motion that these models leave out.

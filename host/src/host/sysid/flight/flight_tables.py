@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.files.regular import file_or_folder
 from host.instrument.recording import Recording
 from host.physical.calibration import Calibration, load_calibration
@@ -39,7 +40,6 @@ from host.sysid.flight.measured import Measured, measured
 from host.sysid.flight.original_table import is_original, original_table
 from host.sysid.flight.recorded import commanded_by_map, recording_of_log, recording_of_table
 from host.sysid.flight.unit_sign_checks import SURFACES
-from host.sysid.identification_error import IdentificationError
 from host.terminal import command_line
 
 if TYPE_CHECKING:

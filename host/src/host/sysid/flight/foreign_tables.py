@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.extras import install_hint
 from host.instrument.recording import Recording
 from host.physical.calibration import Calibration
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.text_table import HEAD_BYTES, read_text
-from host.sysid.identification_error import IdentificationError
 
 if TYPE_CHECKING:
     import pandas as pd

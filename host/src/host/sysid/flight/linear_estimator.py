@@ -14,6 +14,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.instrument.instrument_errors import InstrumentErrors
 from host.instrument.recording import OWN
 from host.sysid.aerodynamics.coefficient_table import (
@@ -73,7 +74,6 @@ from host.sysid.flight.trim_departure import (
     spin_of,
 )
 from host.sysid.flight.widest_errors import widest_errors
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import (
     assess_identifiability,
     collinearity,

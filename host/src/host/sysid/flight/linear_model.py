@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, deviations, unknown_sensors
 from host.instrument.recording import OWN
 from host.sysid.compatibility.path_preparation import NO_OFFSETS
@@ -18,7 +19,6 @@ from host.sysid.flight.filter_step import (
 )
 from host.sysid.flight.hidden_angles import without_vanes
 from host.sysid.flight.reconstructed_flight import FlownManeuver
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.rate_forces import with_rate_forces
 from host.sysid.models.residual_delays import (
     OTHERS_DELAYS,

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array, IntArray
+from host.errors import IdentificationError
 from host.sysid.flight.maneuver_detection import (
     AXES,
     LEAD_S,
@@ -16,7 +17,6 @@ from host.sysid.flight.maneuver_detection import (
     detect_maneuvers,
     runs_of,
 )
-from host.sysid.identification_error import IdentificationError
 
 SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad")
 FEWEST = 8  # samples, as a maneuver needs

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from host.constants import NORMAL_95
+from host.errors import IdentificationError
 from host.instrument.recording import SURFACES, Recording
 from host.original.row_table import NOTES, make_table
 from host.original.rows import LAYOUTS, looks_like_rows, read_rows
 from host.physical.calibration import load_calibration
 from host.sysid.flight.foreign_tables import Foreign
-from host.sysid.identification_error import IdentificationError
 
 _HEAD_BYTES = 4096
 

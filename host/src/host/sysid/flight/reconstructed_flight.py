@@ -14,6 +14,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array, BoolArray
+from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel
 from host.instrument.instrument_errors import InstrumentErrors
 from host.instrument.recording import OWN, SURFACES
@@ -33,7 +34,6 @@ from host.sysid.flight.column_sampling import sampled_name
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.input_kinks import with_means_of_motion
 from host.sysid.flight.maneuver_detection import DetectedManeuver
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
 from host.sysid.numerics.between_samples import with_means_of_smooth_motion

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from host.errors import IdentificationError
 from host.files.user_text import read_toml
-from host.sysid.identification_error import IdentificationError
 
 FOLDER = Path(__file__).with_name("maps")
 LIST = "list"

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from host.sysid.identification_error import IdentificationError
+from host.errors import IdentificationError
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -36,11 +36,11 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
+from host.errors import IdentificationError
 from host.files.quantities import Quantity
 from host.files.user_text import parse_toml, read_text, shown
 from host.sysid.expressions.equation_code import EquationNodes
 from host.sysid.expressions.grammar import NAME, RESERVED
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.file_parts import delays_from, names_from, parameter_from, table_from
 from host.sysid.models.model_constants import ModelConstants, read_constants, read_noise
 from host.sysid.models.nonlinear_model import Equations, NonlinearModel, no_tangent

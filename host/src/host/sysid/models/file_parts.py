@@ -7,9 +7,9 @@ from typing import cast
 
 import numpy as np
 
+from host.errors import IdentificationError
 from host.files.quantities import Quantity
 from host.files.user_text import shown
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.state_space_model import DelayGroup, Parameter
 
 _LARGE = "M_alpha of an indoor model at 10 m/s: -1000 1/s2"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.arrays import Array, BoolArray
-from host.sysid.identification_error import IdentificationError
+from host.errors import IdentificationError
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
 
 if TYPE_CHECKING:

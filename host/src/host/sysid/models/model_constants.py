@@ -21,9 +21,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.files.quantities import Quantity
 from host.files.user_text import shown
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.state_space_model import CONSTANT, LinearModel, Term
 
 OWN = "own"

@@ -42,9 +42,9 @@ from pathlib import Path
 import numpy as np
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.files.quantities import Quantity
 from host.files.user_text import shown
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.equation_file import KIND, read_equations
 from host.sysid.models.file_parts import (
     delays_from,

@@ -16,11 +16,11 @@ from functools import lru_cache
 import numpy as np
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.expressions.equation_code import EquationCode, EquationNodes
 from host.sysid.expressions.evaluation import evaluate
 from host.sysid.expressions.expression_graph import ExpressionError, ExpressionGraph
 from host.sysid.expressions.grammar import NAME, parse_expression
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
 
 SLOPE_STEP = 1e-6  # of a parameter's size: central differences of exact slopes

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.sysid.identification_error import IdentificationError
+from host.errors import IdentificationError
 
 MATRICES = ("A", "B", "C", "D")
 CONSTANT = "one"  # an input that is 1 at every sample: its entries are constants of all records

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from host.constants import GRAVITY_MPS2
-from host.sysid.identification_error import IdentificationError
+from host.errors import IdentificationError
 from host.sysid.models.residual_delays import delays_of
 from host.sysid.models.state_space_model import (
     AccelerometerOffset,

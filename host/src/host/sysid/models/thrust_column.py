@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.export.toml import toml_value
 from host.files.quantities import Quantity
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.toml_document import read_document
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from host.errors import IdentificationError
 from host.files.user_text import read_toml
-from host.sysid.identification_error import IdentificationError
 
 
 def read_document(path: Path) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.identification_error import IdentificationError
+from host.errors import IdentificationError
 
 POLYNOMIAL = 3
 SMALLEST_WINDOW = 5

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.sysid.identification_error import IdentificationError
+from host.errors import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.numerics.equation_filter import filter_equations

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.sysid.identification_error import IdentificationError
+from host.errors import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.discretisation import discretise

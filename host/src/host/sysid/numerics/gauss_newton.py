@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import lapack
 
 from host.arrays import Array, BoolArray
-from host.sysid.identification_error import IdentificationError
+from host.errors import IdentificationError
 
 STEP_LIMIT = 0.01  # in Cramer-Rao bounds: convergence
 MAX_DAMPING = 1e8

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.sysid.identification_error import IdentificationError
+from host.errors import IdentificationError
 from host.sysid.numerics.filter_problem import FilterProblem, SteadyStateFilter
 from host.sysid.numerics.filter_sensitivities import (
     GainSensitivities,

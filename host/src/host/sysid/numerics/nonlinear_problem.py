@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.expressions.expression_graph import ExpressionError
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from host.arrays import Array, BoolArray
-from host.sysid.identification_error import IdentificationError
+from host.errors import IdentificationError
 from host.sysid.numerics.ar_noise import ArNoise
 from host.sysid.numerics.gauss_newton import (
     STEP_LIMIT,

@@ -13,8 +13,8 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
+from host.errors import IdentificationError
 from host.sysid.flight.maneuver_selection import TimeSpan
-from host.sysid.identification_error import IdentificationError
 
 
 def path_of(name: str, given: Any) -> Path | None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from host.errors import IdentificationError
 from host.instrument.deviations import unknown_sensors
 from host.instrument.error_labels import recording_notes
 from host.instrument.servo_prior import servo_prior
@@ -33,7 +34,6 @@ from host.sysid.flight.hidden_angles import no_instrument_errors_finding, no_van
 from host.sysid.flight.maneuver_selection import overlap_notes, select_maneuvers
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight, reconstruct_flight
 from host.sysid.flight.small_inputs import whole_flight
-from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import AircraftData
 from host.sysid.pipeline.reading_options import ReadingOptions
 from host.sysid.pipeline.surface_travel import with_surface_angles

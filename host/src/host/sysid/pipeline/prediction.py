@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.aerodynamics.thrust_terms import with_thrust
 from host.sysid.answer.json_document import json_text
 from host.sysid.flight.free_simulation import frozen_at
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.equation_file import KIND as EQUATIONS
 from host.sysid.models.model_file import read_model
 from host.sysid.models.state_space_model import CONSTANT, LinearModel

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from host.errors import IdentificationError
 from host.near_names import like
 from host.sysid.coefficients.coefficient_model import (
     CoefficientModel,
@@ -15,7 +16,6 @@ from host.sysid.coefficients.coefficient_model import (
 )
 from host.sysid.estimators.method_registry import methods as single_methods
 from host.sysid.flight.linear_model import AXIS_OF, DEFAULT_METHOD, STAGED
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import read_model
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
 from host.sysid.models.thesis_models import model_path, shipped_lines, shipped_models

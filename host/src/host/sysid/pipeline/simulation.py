@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.arrays import Array
+from host.errors import IdentificationError
 from host.sysid.answer.figure_kinds import Trace, histories
 from host.sysid.answer.mat_file import labels
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
@@ -17,7 +18,6 @@ from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.maneuver_selection import excited_axes, merge_overlapping
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight, flown_maneuvers
 from host.sysid.flight.window_prediction import WINDOWS_S, WindowErrors, window_errors
-from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import CONSTANT, LinearModel

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from host.aircraft.prior.prior_file import read_prior
 from host.aircraft.prior.prior_table import PriorTable
+from host.errors import IdentificationError
 from host.progress import stage
 from host.sysid.answer.truth_comparison import read_truth
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, coefficient_estimator
@@ -17,7 +18,6 @@ from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import LinearEstimator
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
-from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import AircraftData, aircraft_data
 from host.sysid.pipeline.arguments import (
     path_of,

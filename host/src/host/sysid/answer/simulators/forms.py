@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from host.errors import IdentificationError
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.aircraft_export import identified_aircraft
 from host.sysid.answer.atomic_files import atomic_write
@@ -20,7 +21,6 @@ from host.sysid.answer.simulators.straight_coefficients import (
 )
 from host.sysid.coefficients.coefficient_fit import MeanCondition
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.identification_error import IdentificationError
 
 FLIGHTGEAR, CONTROL = "-set.xml", ".control.py"
 STRAIGHT: dict[str, Callable[[StraightCoefficients], str]] = {
