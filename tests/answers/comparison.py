@@ -1,0 +1,173 @@
+"""What moved between a frozen answer and a new one, line by line, beyond a tolerance.
+
+The tolerance is a share of the 95 % half-width. Figures of fit and correlations have none and are
+functions of many estimates: ten times the tolerance, of themselves or of one. Texts are equal in
+their words; numbers in them may differ by a unit of their last digit.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from tests.answers.answer_record import Record
+
+STRICT, DEFAULT = 1e-9, 1e-2
+DERIVED = 10.0  # tolerances that a function of many estimates may move
+ROUNDING = 1e-12  # of a value, where it has no width
+MARK_LIMITS = (0.1, 0.3)  # half-width over value, where marks change
+# A number, not a digit of a name (v2_rad) or of a kind of input (3-2-1-1).
+NUMBER = re.compile(r"(?<![\w.-])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w-]|\.\d)")
+TEXTS = ("verdict", "warnings")
+
+
+def moved(old: Record, new: Record, tolerance: float) -> list[str]:
+    """Return a line for everything that moved beyond the tolerance."""
+    if "refused" in old or "refused" in new:
+        both = (("refused", one.get("refused", ["answered"])) for one in (old, new))
+        (_, was), (_, now) = both
+        return list(_texts("refusal", was, now))
+    lines = [
+        *_texts("notes", old["notes"], new["notes"]),
+        *_findings(old["findings"], new["findings"]),
+        *_marks("table", old["marks"], new["marks"], _shares(old), tolerance),
+    ]
+    was, now = (
+        {f"{a['template']}, {a['method']}": a for a in one["answers"]} for one in (old, new)
+    )
+    lines += _names("answers", was, now)
+    for label in was:
+        if label in now:
+            lines += (f"{label}: {line}" for line in _of_answer(was[label], now[label], tolerance))
+    return lines
+
+
+def _of_answer(old: Record, new: Record, tolerance: float) -> Iterator[str]:
+    estimates, others = old["estimates"], new["estimates"]
+    yield from _names("estimates", estimates, others)
+    for name in estimates:
+        if name in others:
+            yield from _estimate(name, estimates[name], others[name], tolerance)
+    yield from _names("modes", old["modes"], new["modes"])
+    for name in old["modes"]:
+        for what, was, now in zip(
+            ("frequency", "damping"), old["modes"][name], new["modes"].get(name, ()), strict=False
+        ):
+            yield from _estimate(f"{name}, {what}", was, now, DERIVED * tolerance)
+    yield from _names("figures", old["figures"], new["figures"])
+    for name, was in old["figures"].items():
+        now = new["figures"].get(name, was)
+        if was is not None and now is not None:
+            limit = max(DERIVED * tolerance, ROUNDING) * abs(was)
+            if abs(now - was) > limit:
+                yield f"{name} {was:.9g} -> {now:.9g}"
+        elif was is not now:
+            yield f"{name} {was} -> {now}"
+    yield from _correlations(old["correlation"], new["correlation"], tolerance)
+    yield from _marks("marks", old["marks"], new["marks"], {}, 0.0)
+    for name in old["reasons"]:
+        yield from _texts(f"reasons of {name}", old["reasons"][name], new["reasons"].get(name, []))
+    for key in ("causes", "template", "model", "method", "converged", "residual_kind", "at_bound",
+                "unpredicted", "constant_inputs", "maneuvers", "held_out", "refused"):  # fmt: skip
+        if old.get(key) != new.get(key):
+            yield f"{key}: {old.get(key)} -> {new.get(key)}"
+    for key in TEXTS:
+        yield from _texts(key, old[key], new[key])
+
+
+def _estimate(name: str, old: list[Any], new: list[Any], tolerance: float) -> Iterator[str]:
+    """Compare value and half-width, both by the half-width."""
+    (was, half), (now, other) = old, new
+    if None in (was, half, now, other):
+        if old != new:
+            yield f"{name} {old} -> {new}"
+        return
+    limit = tolerance * half + ROUNDING * abs(was)
+    if abs(now - was) > limit:
+        share = abs(now - was) / half if half else float("inf")
+        yield f"{name} {was:.9g} -> {now:.9g}, by {share:.2g} half-widths"
+    if abs(other - half) > tolerance * half + ROUNDING * half:
+        yield f"{name} half-width {half:.9g} -> {other:.9g}, by {abs(other / half - 1):.2g} of it"
+
+
+def _correlations(
+    old: list[list[float]], new: list[list[float]], tolerance: float
+) -> Iterator[str]:
+    if [len(row) for row in old] != [len(row) for row in new]:
+        yield f"covariance of {len(old)} parameters -> {len(new)}"
+        return
+    off = [
+        abs(a - b) for was, now in zip(old, new, strict=True) for a, b in zip(was, now, strict=True)
+    ]
+    if max(off, default=0.0) > DERIVED * tolerance:
+        yield f"correlations by {max(off):.2g}"
+
+
+def _findings(old: list[Record], new: list[Record]) -> Iterator[str]:
+    """Compare findings by check and flight: words and values apart."""
+    was, now = ({(f["check"], *f["channels"], f["flight"]): f for f in one} for one in (old, new))
+    yield from _names("findings", was, now)
+    for key in was:
+        if key in now:
+            before, after = _words(was[key]), _words(now[key])
+            yield from _texts(f"finding {key[0]}", before, after)
+
+
+def _words(finding: Mapping[str, Any]) -> list[str]:
+    return [f"{name}: {value}" for name, value in finding.items()]
+
+
+def _marks(
+    what: str,
+    old: Mapping[str, str],
+    new: Mapping[str, str],
+    shares: Mapping[str, float],
+    tolerance: float,
+) -> Iterator[str]:
+    """Compare marks; one may change where its half-width lies that near to a limit."""
+    for name in {**old, **new}:
+        was, now = old.get(name, "none"), new.get(name, "none")
+        share = shares.get(name.split("/")[-1], 0.0)
+        near = any(abs(share - limit) <= 2.0 * tolerance * limit for limit in MARK_LIMITS)
+        if was != now and not near:
+            yield f"{what}: {name} {was} -> {now}"
+
+
+def _shares(record: Record) -> dict[str, float]:
+    """Return half-width over value of every estimate."""
+    return {
+        name: half / abs(value)
+        for one in record["answers"]
+        for name, (value, half) in one["estimates"].items()
+        if value and half is not None
+    }
+
+
+def _names(what: str, old: Mapping[Any, Any], new: Mapping[Any, Any]) -> Iterator[str]:
+    gone, come = ([k for k in a if k not in b] for a, b in ((old, new), (new, old)))
+    if gone:
+        yield f"{what} gone: {gone}"
+    if come:
+        yield f"{what} new: {come}"
+
+
+def _texts(what: str, old: list[str], new: list[str]) -> Iterator[str]:
+    for k in range(max(len(old), len(new))):
+        was, now = (lines[k] if k < len(lines) else "nothing" for lines in (old, new))
+        if not same_text(was, now):
+            yield f"{what}: {was!r} -> {now!r}"
+
+
+def same_text(old: str, new: str) -> bool:
+    """Return whether the words are equal, and numbers within a unit of their last digit."""
+    if NUMBER.sub("#", old) != NUMBER.sub("#", new):
+        return False
+    pairs = zip(NUMBER.findall(old), NUMBER.findall(new), strict=True)
+    return all(abs(float(a) - float(b)) <= 1.001 * max(_unit(a), _unit(b)) for a, b in pairs)
+
+
+def _unit(number: str) -> float:
+    """Return what a step of the last digit of a printed number is."""
+    digits, _, power = number.partition("e")
+    return float(10.0 ** (int(power or 0) - len(digits.partition(".")[2])))

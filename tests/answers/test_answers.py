@@ -1,0 +1,47 @@
+"""Every answer is the frozen one, within a tolerance, and as many intervals hold the truth."""
+
+import pytest
+
+from tests.answers.case import Case
+from tests.answers.cases import CASES
+from tests.answers.comparison import STRICT, moved, same_text
+from tests.answers.frozen_answer import fewer_hold, frozen
+from tests.answers.stored_input import HERE, sums
+
+MOST_BYTES = 10_000_000
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_the_answer_is_the_frozen_one(case: Case, request: pytest.FixtureRequest) -> None:
+    tolerance = request.config.getoption("--tolerance")
+    old, new = frozen(case.name), case.answer()
+    assert old is not None, f"freeze it: python -m tests.answers {case.name} --update"
+    found = [*moved(old, new, tolerance), *fewer_hold(old, new, tolerance)]
+    assert not found, "\n".join(found)
+
+
+def test_stored_inputs_are_those_that_cases_read_and_few_bytes() -> None:
+    named = {name for case in CASES for name in case.files}
+    assert named == set(sums())
+    stored = [path for path in HERE.rglob("*") if path.parent.name in ("inputs", "frozen")]
+    assert sum(path.stat().st_size for path in stored) < MOST_BYTES
+    assert {path.stem for path in stored if path.parent.name == "frozen"} == {c.name for c in CASES}
+
+
+def test_numbers_in_texts_may_differ_by_their_last_digit_and_words_not_at_all() -> None:
+    said = "Cn_r: they scatter 1.7 times what noise allows (3-2-1-1 on elevator)"
+    assert same_text(said, said.replace("1.7", "1.8"))
+    assert not same_text(said, said.replace("1.7", "1.9"))
+    assert not same_text(said, said.replace("3-2-1-1", "3-2-1-2"))
+    assert not same_text(said, said.replace("Cn_r", "Cn_p"))
+
+
+def test_an_estimate_that_moves_by_a_billionth_of_its_width_is_seen() -> None:
+    old = frozen("twin-log-calibrated")
+    new = frozen("twin-log-calibrated")
+    assert old is not None and new is not None
+    estimates = new["answers"][0]["estimates"]
+    estimates["M_alpha"][0] += 2e-9 * estimates["M_alpha"][1]
+    [line] = moved(old, new, STRICT)
+    assert "M_alpha" in line and "2e-09 half-widths" in line
+    assert not moved(old, new, 1e-8)
