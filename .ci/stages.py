@@ -30,9 +30,11 @@ BIN = Path(sys.executable).parent
 PYTHON = sys.executable
 
 # A stage keeps one core busy and waits now and then, for a device's silence or a bus in real time.
-# Four at a time at the most: each may take 0.7 GB, and more would wait for the two longest.
-WORKERS = min(4, 1 + (os.cpu_count() or 1))
+# Four at a time at the most, and as many processes of tests/host: each may take 0.7 GB.
+CORES = min(4, os.cpu_count() or 1)
+WORKERS = min(4, 1 + CORES)
 TAIL_LINES = 40
+SLOWEST = 20
 GENERATOR = re.compile(r"/generate(_\w+)?\.py$")
 
 PYTHON_FOLDERS = ("host/src", "host/studies", "protocol", "tests", "hw", "firmware", ".ci")
@@ -112,7 +114,7 @@ def stages() -> list[Stage]:
         *pytest_stages(),
     ]
     # What others need first, then the longest: the last to end is a short one.
-    first = ("mega", "library", "chip", "sysid", "host", "types", "native", "avr", "sitl")
+    first = ("mega", "library", "host", "answers", "chip", "types", "native", "avr", "sitl")
     return sorted(found, key=lambda stage: (*first, stage.name).index(stage.name))
 
 
@@ -129,26 +131,21 @@ def unit_tests(name: str, environment: str, title: str) -> Stage:
 
 
 def pytest_stages() -> Iterator[Stage]:
-    """Describe one stage per folder of tests/ that pytest can run, and one for identification.
+    """Describe one stage per folder of tests/ that pytest can run.
 
-    Half of all processor time of tests/host is in its sysid: as one stage it would end alone.
+    Half of all processor time is in tests/host: one process would end long after all others, so
+    each core has one, and takes the next file when it is through with its last.
     """
     needs = {"sitl": ("library",), "chip": ("mega",)}
-    after = {
-        "host": ("mega", "library"),
-        "sysid": ("library",),
-        "chip": ("library",),
-        "layering": ("mega",),
-    }
+    after = {"host": ("mega", "library"), "chip": ("library",), "layering": ("mega",)}
+    divided = {"host": (f"--numprocesses={CORES}", "--dist=loadfile")}
     folders = {path.relative_to(ROOT / "tests").parts[0] for path in _test_files()}
-    apart = {"host": ("--ignore=tests/host/sysid",)}
-    for name in sorted(folders - {"firmware"} | {"sysid"}):
-        place = "tests/host/sysid" if name == "sysid" else f"tests/{name}"
+    for name in sorted(folders - {"firmware"}):
         report = f"--junit-xml={report_path(name)}"
         yield Stage(
             name,
-            f"pytest {place}",
-            ((PYTHON, "-m", "pytest", place, *apart.get(name, ()), report),),
+            f"pytest tests/{name}",
+            ((PYTHON, "-m", "pytest", f"tests/{name}", *divided.get(name, ()), report),),
             needs=needs.get(name, ()),
             after=after.get(name, ()),
             report=True,
@@ -208,6 +205,23 @@ def count_cases(path: Path) -> tuple[int, int]:
     return len(cases) - failed - skipped, failed
 
 
+def slowest_cases(reports: Sequence[Path]) -> list[tuple[float, str]]:
+    """List processor seconds and name of each case that says them, most first.
+
+    The first case of a file pays what its later ones share: see tests/conftest.py.
+    """
+    found = []
+    for path in reports:
+        if not path.is_file():
+            continue
+        for case in ElementTree.parse(path).getroot().iter("testcase"):
+            used = case.find("properties/property[@name='cpu_s']")
+            if used is not None:
+                name = f"{case.get('classname')}.{case.get('name')}"
+                found.append((float(used.get("value", "0")), name))
+    return sorted(found, reverse=True)
+
+
 def say(text: str) -> None:
     """Print at once, also into a pipe."""
     print(text, flush=True)
@@ -259,6 +273,10 @@ def main() -> int:
             futures[stage.name] = pool.submit(run, stage, dict(futures))
     outcomes = [future.result() for future in futures.values()]
     say("\n" + table(outcomes, time.monotonic() - start_s))
+    slowest = slowest_cases([report_path(stage.name) for stage in chosen])
+    if slowest:
+        say(f"\n{'cpu s':>8}  slowest cases")
+        say("\n".join(f"{cpu_s:>8.1f}  {name}" for cpu_s, name in slowest[:SLOWEST]))
     passed = sum(outcome.passed for outcome in outcomes)
     failed = sum(outcome.failed for outcome in outcomes)
     last = f"tests: {passed} passed, {failed} failed"

@@ -57,6 +57,34 @@ def test_processor_time_is_that_of_all_processes_of_a_stage(runner: ModuleType) 
     assert f"{outcome.cpu_s / 60:8.2f}" in runner.table([outcome], 1.0)
 
 
+def test_a_case_is_listed_with_its_childs_processor_time_and_what_it_shares(
+    runner: ModuleType, tmp_path: Path
+) -> None:
+    """Four tenths of a second are in the shared fixture, three in a child of the first case."""
+    busy = "import time\nwhile time.process_time() < {}: pass"
+    (tmp_path / "conftest.py").write_text((ROOT / "tests" / "conftest.py").read_text())
+    (tmp_path / "test_two.py").write_text(
+        "import subprocess, sys, pytest\n"
+        "def work(s):\n"
+        f"    subprocess.run([sys.executable, '-c', {busy!r}.format(s)])\n"
+        "@pytest.fixture(scope='module')\n"
+        "def shared():\n"
+        "    work(0.4)\n"
+        "def test_first(shared):\n"
+        "    work(0.3)\n"
+        "def test_second(shared):\n"
+        "    pass\n"
+    )
+    report = tmp_path / "a.xml"
+    command = (sys.executable, "-m", "pytest", "--numprocesses=1", f"--junit-xml={report}")
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    (first_s, first), (second_s, second) = runner.slowest_cases([report])
+    assert first.endswith("test_first")
+    assert 0.7 < first_s < 1.5
+    assert second.endswith("test_second")
+    assert second_s < 0.1
+
+
 def test_a_stage_without_its_report_has_failed(runner: ModuleType) -> None:
     stage = runner.Stage("a", "no cases", (python("pass"),), report=True)
     outcome = runner.run(stage, {})
