@@ -7,7 +7,6 @@ import pytest
 from host.arrays import BoolArray
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
-from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.filter_problem import FilterProblem, InnovationLikelihood
 from host.sysid.numerics.filter_scoring import (
     fisher_scoring,
@@ -85,36 +84,25 @@ def known(point: InnovationLikelihood | None) -> InnovationLikelihood:
     return point
 
 
-def next_state(problem: FilterProblem, theta: np.ndarray) -> np.ndarray:
-    """Return [Phi Gamma] of the first maneuver."""
-    A, B, _, _ = problem.model.matrices(theta)
-    rate, _, _ = problem.constants(theta, 0)
-    none = np.zeros(0, dtype=np.int64)
-    foh = problem.model.hold == "foh"
-    AB = np.column_stack([A, B, rate])
-    return discretise(AB, 3, 1, foh, DT_S, none, none, none, np.zeros(0), 0)[0]
-
-
 def dense_moments(problem: FilterProblem, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return joint mean and covariance of all that was measured."""
     model, maneuver = problem.model, problem.maneuvers[0]
-    A, _, C, D = model.matrices(theta)
-    _, bias, start = problem.constants(theta, 0)
+    A, _, C, _ = model.matrices(theta)
+    one, drive = problem.sampled(0, theta), problem.output_problem.drive(0)
     intensity, power = problem.noise(theta)
     steady = known(problem.evaluate(theta)).filters[0]
     F, Q = discrete_noise(A, intensity, DT_S)
-    step, n = next_state(problem, theta), len(A)
-    mean, x = [], start
+    mean, x, n = [], one.start, len(A)
     spread = np.zeros((SAMPLES * n, SAMPLES * n))
     P = steady.P
     for k in range(SAMPLES):
-        mean.append(C @ x + D @ maneuver.inputs[k] + bias)
+        mean.append(one.read @ np.concatenate([x, drive[k]]))
         cross = P
         for later in range(k, SAMPLES):
             spread[later * n : later * n + n, k * n : k * n + n] = cross
             spread[k * n : k * n + n, later * n : later * n + n] = cross.T
             cross = F @ cross
-        x, P = step @ np.concatenate([x, problem.drives[0][k]]), F @ P @ F.T + Q
+        x, P = one.step @ np.concatenate([x, drive[k]]), F @ P @ F.T + Q
     rows = np.kron(np.eye(SAMPLES), C)
     covariance = rows @ spread @ rows.T + np.diag(np.tile(power, SAMPLES))
     seen = maneuver.seen.ravel()
@@ -184,19 +172,17 @@ def test_gradient_and_slopes_are_those_of_differences() -> None:
 def test_information_is_the_covariance_of_the_score() -> None:
     """Over data that the model itself draws, outputs missing at random."""
     problem, theta = problem_of("each fifth")
-    _, _, C, D = problem.model.matrices(theta)
-    _, bias, start = problem.constants(theta, 0)
+    one = problem.sampled(0, theta)
     _, power = problem.noise(theta)
     steady = known(problem.evaluate(theta)).filters[0]
-    step = next_state(problem, theta)
     rng, draws = np.random.default_rng(9), 400
     root, kick = (np.linalg.cholesky(x + 1e-18 * np.eye(3)) for x in (steady.P, steady.Q))
     scores, told = [], []
     for _ in range(draws):
-        x, y = start + root @ rng.standard_normal(3), np.zeros((SAMPLES, 3))
-        for k, drive in enumerate(problem.drives[0]):
-            y[k] = C @ x + D @ drive[:1] + bias + np.sqrt(power) * rng.standard_normal(3)
-            x = step @ np.concatenate([x, drive]) + kick @ rng.standard_normal(3)
+        x, y = one.start + root @ rng.standard_normal(3), np.zeros((SAMPLES, 3))
+        for k, drive in enumerate(problem.output_problem.drive(0)):
+            y[k] = one.read @ np.concatenate([x, drive]) + np.sqrt(power) * rng.standard_normal(3)
+            x = one.step @ np.concatenate([x, drive]) + kick @ rng.standard_normal(3)
         drawn = FilterProblem(problem.model, [replace(problem.maneuvers[0], outputs=y)], PROCESS)
         point = known(drawn.evaluate(theta))
         [information], [score] = fisher_scoring(drawn, theta, point)

@@ -89,13 +89,17 @@ def sampled(A: np.ndarray, B: np.ndarray, dt_s: float) -> tuple[np.ndarray, np.n
     return np.asarray(held.A), np.asarray(held.B)
 
 
-def test_likelihood_and_innovations_of_filter_error_are_those_of_statsmodels() -> None:
+@pytest.mark.parametrize("share", [1.0, 0.6])
+def test_likelihood_and_innovations_of_filter_error_are_those_of_statsmodels(share: float) -> None:
     """Same model, same noise, first covariance the steady one: same likelihood to the last digit.
 
     Left to itself statsmodels starts from a diffuse state; the steady filter here takes start
-    states for parameters instead, which is the same from the second time constant on.
+    states for parameters instead, which is the same from the second time constant on. Of outputs
+    that were measured at a share of the samples both leave out the others.
     """
     maneuver = noisy(34, 0.05)
+    seen = np.random.default_rng(38).random(maneuver.outputs.shape) < share
+    maneuver = replace(maneuver, sampled=seen)
     model = navion_structured()
     process, noise = np.array([0.3, 0.02, 0.1]), np.array([0.8, 0.01, 0.02, 0.015])
     start = np.array([0.4, -0.01, 0.02, 0.01])
@@ -111,7 +115,7 @@ def test_likelihood_and_innovations_of_filter_error_are_those_of_statsmodels() -
     Q, R = X - F @ X @ F.T, np.diag(noise**2)
     gain, P, _ = control.dlqe(F, np.eye(4), np.eye(4), 0.5 * (Q + Q.T), R)
     peer = KalmanFilter(k_endog=4, k_states=4, k_posdef=4)
-    peer.bind(maneuver.outputs)
+    peer.bind(np.where(seen, maneuver.outputs, np.nan))
     peer["design"] = np.eye(4)
     peer["transition"] = F
     peer["selection"] = np.eye(4)
@@ -119,9 +123,10 @@ def test_likelihood_and_innovations_of_filter_error_are_those_of_statsmodels() -
     peer["state_cov"], peer["obs_cov"] = 0.5 * (Q + Q.T), R
     peer.initialize_known(start, P)
     output = peer.filter()
-    np.testing.assert_allclose(point.e[0], output.forecasts_error.T, atol=1e-8)
+    expected = np.where(seen, output.forecasts_error.T, 0.0)
+    np.testing.assert_allclose(point.e[0], expected, atol=1e-8)
     # Our cost leaves out the constant of the normal density.
-    constant = 0.5 * maneuver.outputs.size * np.log(2.0 * np.pi)
+    constant = 0.5 * seen.sum() * np.log(2.0 * np.pi)
     assert -point.cost - constant == pytest.approx(float(output.llf), rel=1e-9)
     # python-control's gain predicts: it has the transition in it.
     np.testing.assert_allclose(F @ point.filters[0].K, gain, rtol=1e-6, atol=1e-9)

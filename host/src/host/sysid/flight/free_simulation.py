@@ -243,25 +243,9 @@ def _run_of(frozen: LinearModel, maneuver: Maneuver, theta: Array) -> FreeRun:
 def _states(frozen: LinearModel, maneuver: Maneuver, theta: Array) -> Array:
     """Return the states of the run with constants `theta`, (samples, n)."""
     problem = output_problem(frozen, [maneuver])
-    if isinstance(problem, NonlinearProblem):
-        problem.choose_step(theta)
-        run = problem.simulated(theta, problem.substeps, problem.ramp)
-        return np.full((maneuver.samples, len(frozen.states)), np.nan) if run is None else run[0][1]
-    n, m = len(frozen.states), len(frozen.inputs)
-    bare = replace(
-        frozen,
-        outputs=frozen.states,
-        C=np.eye(n),
-        D=np.zeros((n, m)),
-        output_biases=(),
-        known_noise=(),
-    )
-    first, last = len(frozen.state_biases), len(frozen.state_biases) + len(frozen.output_biases)
-    own = np.concatenate([theta[:first], theta[last:]])
-    nothing = np.zeros((maneuver.samples, n))
-    empty = Maneuver(maneuver.dt_s, maneuver.inputs, nothing, name=maneuver.name)
-    found = output_problem(bare, [empty]).outputs(own)
-    return np.full((maneuver.samples, n), np.nan) if found is None else found[0].T.copy()
+    problem.choose_step(theta)
+    run = problem.simulated(theta)
+    return np.full((maneuver.samples, len(frozen.states)), np.nan) if run is None else run[0][1]
 
 
 def _biases(frozen: LinearModel, theta: Array) -> Biases:

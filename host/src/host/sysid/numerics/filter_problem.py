@@ -15,7 +15,6 @@ from host.arrays import Array, IntArray
 from host.errors import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.intermittent_filter import (
     FilterEquations,
     IntermittentInnovations,
@@ -24,6 +23,7 @@ from host.sysid.numerics.intermittent_filter import (
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.process_noise import discrete_noise
 from host.sysid.numerics.riccati import filter_innovations, predicted_covariance
+from host.sysid.numerics.sampled_model import SampledModel
 
 SAME_PERIOD = 1e-9
 
@@ -139,12 +139,6 @@ class FilterProblem:
             *(f"log_process.{s}" for s in process),
             *(f"log_noise.{y}" for y in model.outputs),
         )
-        self.drives = []
-        for maneuver in maneuvers:
-            columns = [maneuver.inputs, np.ones((maneuver.samples, 1))]
-            if model.hold == "foh":
-                columns.append(np.diff(maneuver.inputs, axis=0, append=maneuver.inputs[-1:]))
-            self.drives.append(np.ascontiguousarray(np.hstack(columns)))
 
     def noise(self, theta: Array) -> tuple[Array, Array]:
         """Return spectral density of every state's process noise and variance of every output."""
@@ -159,24 +153,10 @@ class FilterProblem:
         noise = np.arange(self.n_model, len(self.names))
         return np.concatenate([self.output_problem.columns(maneuver), noise])
 
-    def constants(self, theta: Array, maneuver: int) -> tuple[Array, Array, Array]:
-        """Return biases of states and outputs, and initial states of a maneuver."""
-        model = self.model
-        local = iter(theta[self.output_problem.columns(maneuver)[self.output_problem.n_common :]])
-        names = model.states, model.outputs, model.states
-        which = model.state_biases, model.output_biases, model.initial_states
-        likelihood = []
-        for every, own in zip(names, which, strict=True):
-            values = np.zeros(len(every))
-            for name in own:
-                values[every.index(name)] = next(local)
-            likelihood.append(values)
-        start = likelihood[2]
-        for state, value in model.known_starts:
-            start[model.states.index(state)] = value
-        for state, name in model.shared_starts:
-            start[model.states.index(state)] = theta[self.names.index(name)]
-        return likelihood[0], likelihood[1], start
+    def sampled(self, maneuver: int, theta: Array) -> SampledModel:
+        """Return the model over one sample of a maneuver, its slopes by `columns`."""
+        found = self.output_problem.sampled(maneuver, theta)
+        return found.padded(len(self.names) - self.n_model)
 
     def evaluate(self, theta: Array) -> InnovationLikelihood | None:
         """Return innovations and cost; None where the filter or the model fails.
@@ -184,25 +164,15 @@ class FilterProblem:
         The cost is J = 1/2 sum nu' S^-1 nu + N/2 ln det S over the innovations nu of N samples
         (EQUATIONS.md, eq. 31), plus the prior.
         """
-        model = self.model
-        n, m = len(model.states), len(model.inputs)
-        A, B, C, D = model.matrices(theta)
-        AB = np.zeros((n, n + m + 1))
-        AB[:, :n], AB[:, n : n + m] = A, B
-        CD = np.ascontiguousarray(np.hstack([C, D]))
+        A, _, C, _ = self.model.matrices(theta)
         intensity, power = self.noise(theta)
         if not (np.isfinite(intensity).all() and np.isfinite(power).all()):
             return None
-        none = np.zeros(0, dtype=np.int64)
         of_period: dict[float, SteadyStateFilter] = {}
         likelihood = InnovationLikelihood(z=[], e=[], filters=[], intermittent=[], cost=0.0)
-        for number, maneuver in enumerate(self.maneuvers):
-            rate, bias, start = self.constants(theta, number)
-            AB[:, -1] = rate
-            step, _ = discretise(
-                AB, n, m, model.hold == "foh", maneuver.dt_s, none, none, none, np.zeros(0), 0
-            )
-            period_s = self.periods_s[number]
+        for number, (maneuver, period_s) in enumerate(
+            zip(self.maneuvers, self.periods_s, strict=True)
+        ):
             steady = of_period.get(period_s) or steady_state_filter(
                 A, C, intensity, np.diag(power), period_s
             )
@@ -210,27 +180,20 @@ class FilterProblem:
                 return None
             of_period[period_s] = steady
             likelihood.filters.append(steady)
+            sampled = self.output_problem.sampled(number, theta, slopes=False)
             run = self._intermittent if maneuver.held else self._steady
-            if not run(likelihood, step, CD, power, start, bias):
+            if not run(likelihood, sampled, power):
                 return None
         prior = self.output_problem.prior_precision
         deviation = theta[: self.n_model] - self.output_problem.prior_mean
         likelihood.cost += 0.5 * float(np.sum(prior * deviation**2))
         return likelihood if np.isfinite(likelihood.cost) else None
 
-    def _steady(
-        self,
-        likelihood: InnovationLikelihood,
-        step: Array,
-        CD: Array,
-        power: Array,
-        start: Array,
-        bias: Array,
-    ) -> bool:
+    def _steady(self, likelihood: InnovationLikelihood, model: SampledModel, power: Array) -> bool:
         """Add the next maneuver by the steady gain of its filter; return whether it is finite."""
         number, gain = len(likelihood.e), likelihood.filters[-1]
-        measured = self.maneuvers[number].outputs
-        finite, z = filter_innovations(step, CD, gain.K, self.drives[number], measured, start, bias)
+        measured, drive = self.maneuvers[number].outputs, self.output_problem.drive(number)
+        finite, z = filter_innovations(model, gain.K, drive, measured)
         if not finite:
             return False
         likelihood.z.append(z)
@@ -242,13 +205,7 @@ class FilterProblem:
         return True
 
     def _intermittent(
-        self,
-        likelihood: InnovationLikelihood,
-        step: Array,
-        CD: Array,
-        power: Array,
-        start: Array,
-        bias: Array,
+        self, likelihood: InnovationLikelihood, model: SampledModel, power: Array
     ) -> bool:
         """Add the next maneuver, outputs missing; return whether the filter did not fail.
 
@@ -256,16 +213,8 @@ class FilterProblem:
         """
         number, steady = len(likelihood.e), likelihood.filters[-1]
         found = filter_intermittent(
-            FilterEquations.of_values(
-                step=step,
-                CD=CD,
-                bias=bias,
-                Q=steady.Q,
-                variance=power,
-                start=start,
-                P=steady.P,
-            ),
-            self.drives[number],
+            FilterEquations.of_known_noise(model, steady.Q, power, steady.P),
+            self.output_problem.drive(number),
             self.maneuvers[number],
         )
         if found is None:

@@ -8,12 +8,7 @@ import numpy as np
 
 from host.arrays import Array, IntArray
 from host.sysid.numerics.filter_problem import FilterProblem, InnovationLikelihood
-from host.sysid.numerics.filter_sensitivities import (
-    GainSensitivities,
-    gain_sensitivities,
-    maneuver_sensitivities,
-    matrix_sensitivities,
-)
+from host.sysid.numerics.filter_sensitivities import GainSensitivities, gain_sensitivities
 from host.sysid.numerics.intermittent_scoring import intermittent_scoring, intermittent_slopes
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.recursion import propagate
@@ -42,10 +37,9 @@ def fisher_scoring(
     list of Array, shape (P,)
         Negative gradients.
     """
-    matrices = matrix_sensitivities(problem.model, theta)
-    gains = _gain_sensitivities(problem, theta, point, matrices)
+    gains = _gain_sensitivities(problem, theta, point)
     found = [
-        _steady_scoring(problem, theta, point, number, by, matrices)
+        _steady_scoring(problem, theta, point, number, by)
         if point.intermittent[number] is None
         else intermittent_scoring(problem, theta, number, point.filters[number], by)
         for number, by in enumerate(gains)
@@ -59,11 +53,10 @@ def _steady_scoring(
     point: InnovationLikelihood,
     number: int,
     by: GainSensitivities,
-    matrices: tuple[Array, Array, Array],
 ) -> tuple[Array, Array]:
     """Return information and negative gradient of a maneuver that is measured at every sample."""
     steady, active = point.filters[number], problem.columns(number)
-    J = _innovation_sensitivities(problem, theta, point, number, by, matrices)
+    J = _innovation_sensitivities(problem, theta, point, number, by)
     white = point.e[number] @ steady.whitener.T
     information, gradient = np.zeros((len(theta), len(theta))), np.zeros(len(theta))
     information[np.ix_(active, active)] = J.T @ J
@@ -83,8 +76,7 @@ def whitened_innovation_sensitivities(
     problem: FilterProblem, theta: Array, point: InnovationLikelihood
 ) -> list[Array]:
     """Return sensitivities of the whitened innovations of every maneuver, (samples, p, P)."""
-    matrices = matrix_sensitivities(problem.model, theta)
-    gains = _gain_sensitivities(problem, theta, point, matrices)
+    gains = _gain_sensitivities(problem, theta, point)
     found: list[Array] = []
     for number, (e, by) in enumerate(zip(point.e, gains, strict=True)):
         slopes = np.zeros((e.size, len(theta)))
@@ -93,26 +85,22 @@ def whitened_innovation_sensitivities(
             slopes[:, columns] = run.by_independent.reshape(e.size, -1)
         else:
             slopes[:, problem.columns(number)] = _innovation_sensitivities(
-                problem, theta, point, number, by, matrices
+                problem, theta, point, number, by
             )
         found.append(slopes.reshape(*e.shape, -1))
     return found
 
 
 def _gain_sensitivities(
-    problem: FilterProblem,
-    theta: Array,
-    point: InnovationLikelihood,
-    matrices: tuple[Array, Array, Array],
+    problem: FilterProblem, theta: Array, point: InnovationLikelihood
 ) -> list[GainSensitivities]:
     """Return those of every maneuver's filter, found once for each sample period."""
-    AB_slopes, _, CD_slopes = matrices
     of_period: dict[float, GainSensitivities] = {}
-    for period_s, steady in zip(problem.periods_s, point.filters, strict=True):
+    n, common = len(problem.model.states), problem.output_problem.n_common
+    for number, (period_s, steady) in enumerate(zip(problem.periods_s, point.filters, strict=True)):
         if period_s not in of_period:
-            of_period[period_s] = gain_sensitivities(
-                problem, theta, steady, period_s, AB_slopes, CD_slopes
-            )
+            C_slopes = problem.sampled(number, theta).by_read[:, :n, :common]
+            of_period[period_s] = gain_sensitivities(problem, theta, steady, period_s, C_slopes)
     return [of_period[period_s] for period_s in problem.periods_s]
 
 
@@ -128,30 +116,24 @@ def _innovation_sensitivities(
     point: InnovationLikelihood,
     number: int,
     by: GainSensitivities,
-    matrices: tuple[Array, Array, Array],
 ) -> Array:
     """Return sensitivities of the whitened innovations, (samples x p, own columns)."""
-    _, CD, CD_slopes = matrices
-    model, output_problem = problem.model, problem.output_problem
-    n, p = len(model.states), len(model.outputs)
-    gain = point.filters[number]
-    common, local = output_problem.n_common, output_problem.n_local
-    width = common + local + len(theta) - problem.n_model
-    noise = slice(common + local, width)
-    one = maneuver_sensitivities(problem, theta, number, CD_slopes)
-    step_slopes, direct = one.by_step, one.direct
-    w, rows_known = one.step.shape[1] - n, step_slopes.shape[2]
+    n, p = len(problem.model.states), len(problem.model.outputs)
+    gain, common = point.filters[number], problem.output_problem.n_common
+    one = problem.sampled(number, theta)
+    direct = one.by_read.transpose(1, 0, 2)
+    w, width = one.step.shape[1] - n, one.by_start.shape[1]
+    noise = slice(common + problem.output_problem.n_local, width)
     drive = np.zeros((n + w + p, n, width))
-    drive[: n + w, :, :rows_known] = step_slopes.transpose(1, 0, 2)
     FK = gain.F @ gain.K
-    drive[: n + w] -= FK @ direct
-    drive[n + w :, :, :common] = np.einsum("iaq,aj->jiq", step_slopes[:, :n, :common], gain.K)
+    drive[: n + w] = one.by_step.transpose(1, 0, 2) - FK @ direct
+    drive[n + w :, :, :common] = np.einsum("iaq,aj->jiq", one.by_step[:, :n, :common], gain.K)
     for part, own in ((slice(0, common), slice(0, common)), (noise, slice(common, None))):
         drive[n + w :, :, part] += np.einsum("ia,qaj->jiq", gain.F, by.K[own])
     z = point.z[number]
     out = np.empty((p, len(z), width))
-    whitened_C = gain.whitener @ CD[:, :n]
-    propagate(gain.F - FK @ CD[:, :n], drive.transpose(1, 0, 2), z, whitened_C, one.start, out)
+    whitened_C = gain.whitener @ one.C
+    propagate(gain.F - FK @ one.C, drive.transpose(1, 0, 2), z, whitened_C, one.by_start, out)
     # Direct part at a fixed state; the rest comes through the state.
     known_state = -(gain.whitener @ direct).reshape(n + w, -1)
     slopes = (z[:, : n + w] @ known_state).reshape(len(z), p, width)

@@ -21,6 +21,7 @@ from host.sysid.numerics.filter_problem import (
     steady_state_filter,
 )
 from host.sysid.numerics.intermittent_filter import FilterEquations, filter_intermittent
+from host.sysid.numerics.sampled_model import SampledModel
 
 
 @dataclass(frozen=True)
@@ -102,28 +103,24 @@ def _response_to_constants(model: LinearModel, by: FilterAt, made: FilterAt) -> 
         )
     )
     biases = rates.shape[1] + places.shape[1]
-    still = FilterEquations.of_values(
-        step=np.block(
-            [
-                [by.steady.F, by.steady.F - F, np.zeros((n, 1))],
-                [np.zeros((n, n)), F, np.zeros((n, 1))],
-            ]
-        ),
-        CD=np.hstack([by.C, by.C - made.C]),
-        bias=np.zeros(p),
-        Q=linalg.block_diag(by.steady.Q, np.zeros((n, n))),
-        variance=by.variance,
-        start=np.zeros(2 * n),
-        P=linalg.block_diag(by.steady.P, np.zeros((n, n))),
-    )
     total = biases + starts.shape[1]
-    by_step, by_read = (np.zeros((*x.shape, total)) for x in (still.step, still.read))
     rise = _rise(made, rates)
+    by_step, by_read = np.zeros((2 * n, 2 * n + 1, total)), np.zeros((p, 2 * n + 1, total))
     by_step[:, -1, : rates.shape[1]] = np.vstack([-rise, rise])
     by_read[:, -1, rates.shape[1] : biases] = -places
     by_start = np.zeros((2 * n, total))
     by_start[:, biases:] = np.vstack([-starts, starts])
-    return replace(still, by_step=by_step, by_read=by_read, by_start=by_start)
+    nothing = np.zeros((n, 1))
+    still = SampledModel(
+        step=np.block([[by.steady.F, by.steady.F - F, nothing], [np.zeros((n, n)), F, nothing]]),
+        by_step=by_step,
+        read=np.hstack([by.C, by.C - made.C, np.zeros((p, 1))]),
+        by_read=by_read,
+        start=np.zeros(2 * n),
+        by_start=by_start,
+    )
+    Q, P = (linalg.block_diag(x, np.zeros((n, n))) for x in (by.steady.Q, by.steady.P))
+    return FilterEquations.of_known_noise(still, Q, by.variance, P)
 
 
 def _rise(made: FilterAt, rates: Array) -> Array:
@@ -156,7 +153,9 @@ class _SteadySums:
         transition[: n + more, n + more :] = np.vstack([first.constant[:n], second.constant])
         own = np.hstack([first.read[:, :n], np.zeros_like(second.read), first.direct])
         other = np.hstack([np.zeros((len(own), n)), second.read, second.direct])
-        self._start = np.vstack([here[1].by_start[:n], there[1].by_start, np.eye(constants)])
+        self._start = np.vstack(
+            [here[1].model.by_start[:n], there[1].model.by_start, np.eye(constants)]
+        )
         self._powers = [(own.T @ own, own.T @ (other - own), transition)]
 
     def over(self, samples: int) -> tuple[Array, Array]:
@@ -188,12 +187,13 @@ class _SteadyInnovations:
 
 
 def _steady_innovations(by: FilterAt, equations: FilterEquations) -> _SteadyInnovations:
-    gain = np.zeros((len(equations.start), len(by.C)))
+    model = equations.model
+    gain = np.zeros((len(model.start), len(by.C)))
     gain[: len(by.A)] = by.steady.F @ by.steady.K
-    read, by_constant = equations.read[:, :-1], equations.by_read[:, -1]
+    read, by_constant = model.read[:, :-1], model.by_read[:, -1]
     return _SteadyInnovations(
-        step=equations.step[:, :-1] - gain @ read,
-        constant=equations.by_step[:, -1] - gain @ by_constant,
+        step=model.step[:, :-1] - gain @ read,
+        constant=model.by_step[:, -1] - gain @ by_constant,
         read=-by.steady.whitener @ read,
         direct=-by.steady.whitener @ by_constant,
     )

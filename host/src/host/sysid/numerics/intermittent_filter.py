@@ -21,73 +21,41 @@ from host.compiled import compiled, compiled_part, has_compiler
 from host.extras import install_hint
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.numerics.recursion import STATE_LIMIT
+from host.sysid.numerics.sampled_model import SampledModel
 
 SAMPLES_WITHOUT_COMPILER = 500  # of a filter that Python runs in minutes
 
 
 @dataclass(frozen=True, slots=True)
 class FilterEquations:
-    """A linear model over one sample, and its slopes by L unknowns, `shared` of them.
+    """A linear model over one sample and its noise, with slopes by L unknowns, `shared` of them.
 
     Attributes
     ----------
-    step, by_step : Array, shape (n, n + w), (n, n + w, L)
-        [Phi Gamma]: the next state by state and drive.
-    read, by_read : Array, shape (p, n + w), (p, n + w, L)
-        Outputs by state and drive.
+    model : SampledModel
+        Its start is the predicted state of the first sample.
     Q, Q_slopes : Array, shape (n, n), (n, n, shared)
         Covariance of the process noise of a sample.
     variance : Array, shape (p,)
         Of the measurement noise.
-    start, by_start : Array, shape (n,), (n, L)
-        Predicted state of the first sample.
     P, P_slopes : Array, shape (n, n), (n, n, shared)
-        Its covariance.
+        Covariance of the predicted state of the first sample.
     """
 
-    step: Array
-    by_step: Array
-    read: Array
-    by_read: Array
+    model: SampledModel
     Q: Array
     Q_slopes: Array
     variance: Array
-    start: Array
-    by_start: Array
     P: Array
     P_slopes: Array
 
     @classmethod
-    def of_values(
-        cls,
-        *,
-        step: Array,
-        CD: Array,
-        bias: Array,
-        Q: Array,
-        variance: Array,
-        start: Array,
-        P: Array,
+    def of_known_noise(
+        cls, model: SampledModel, Q: Array, variance: Array, P: Array
     ) -> FilterEquations:
-        """Return equations without slopes; biases of the outputs act behind the inputs."""
-        n, wide = step.shape
-        read = np.zeros((len(CD), wide))
-        read[:, : CD.shape[1]], read[:, CD.shape[1]] = CD, bias
-        none = np.zeros((n, wide, 0))
-        by_read, square = np.zeros((*read.shape, 0)), np.zeros((n, n, 0))
-        return cls(
-            step=step,
-            by_step=none,
-            read=read,
-            by_read=by_read,
-            Q=Q,
-            Q_slopes=square,
-            variance=variance,
-            start=start,
-            by_start=np.zeros((n, 0)),
-            P=P,
-            P_slopes=square,
-        )
+        """Return equations whose unknowns do not move the noise, nor what a state does."""
+        none = np.zeros((*P.shape, 0))
+        return cls(model=model, Q=Q, Q_slopes=none, variance=variance, P=P, P_slopes=none)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,18 +107,18 @@ def filter_intermittent(
     maneuver : Maneuver
         Its outputs, and at which samples each was measured.
     """
-    q, measured = equations, maneuver.outputs
+    q, s, measured = equations, equations.model, maneuver.outputs
     size = measured.shape
     found = IntermittentInnovations(
         e=np.zeros(size),
         independent=np.zeros(size),
         variance=np.ones(size),
-        by_independent=np.zeros((*size, q.by_start.shape[1])),
+        by_independent=np.zeros((*size, s.by_start.shape[1])),
         by_variance=np.zeros((*size, q.P_slopes.shape[2])),
     )
     done = _filter(
-        q.step, q.by_step, q.read, q.by_read, q.Q, q.Q_slopes, q.variance, q.start.copy(),
-        q.by_start.copy(), q.P.copy(), q.P_slopes.copy(), drive, measured,
+        s.step, s.by_step, s.read, s.by_read, q.Q, q.Q_slopes, q.variance, s.start.copy(),
+        s.by_start.copy(), q.P.copy(), q.P_slopes.copy(), drive, measured,
         maneuver.seen, found.e, found.independent, found.variance,
         found.by_independent, found.by_variance,
     )  # fmt: skip

@@ -9,11 +9,7 @@ import numpy as np
 from host.arrays import Array, IntArray
 from host.errors import IdentificationError
 from host.sysid.numerics.filter_problem import FilterProblem, SteadyStateFilter
-from host.sysid.numerics.filter_sensitivities import (
-    GainSensitivities,
-    maneuver_sensitivities,
-    matrix_sensitivities,
-)
+from host.sysid.numerics.filter_sensitivities import GainSensitivities
 from host.sysid.numerics.intermittent_filter import (
     FilterEquations,
     IntermittentInnovations,
@@ -103,30 +99,17 @@ def intermittent_innovations(
 
     They are by the unknowns of `intermittent_slopes`; without `by` by its constants alone.
     """
-    outputs = problem.output_problem
-    _, CD, CD_slopes = matrix_sensitivities(problem.model, theta)
-    one = maneuver_sensitivities(problem, theta, number, CD_slopes)
-    common = outputs.n_common
-    columns = common + np.arange(outputs.n_local)
-    if by is not None:
-        columns = _states_last(common, outputs.n_local, one.start.shape[1])
-    by_step = np.zeros((*one.step.shape, one.start.shape[1]))
-    by_step[:, :, : one.by_step.shape[2]] = one.by_step
-    _, bias, start = problem.constants(theta, number)
+    outputs, model = problem.output_problem, problem.sampled(number, theta)
     _, power = problem.noise(theta)
-    values = FilterEquations.of_values(
-        step=one.step, CD=CD, bias=bias, Q=steady.Q, variance=power, start=start, P=steady.P
-    )
-    slopes = replace(
-        values,
-        by_step=np.ascontiguousarray(by_step[:, :, columns]),
-        by_read=np.ascontiguousarray(one.direct.transpose(1, 0, 2)[:, :, columns]),
-        by_start=np.ascontiguousarray(one.start[:, columns]),
-    )
-    if by is not None:
+    equations = FilterEquations.of_known_noise(model, steady.Q, power, steady.P)
+    if by is None:
+        columns = outputs.n_common + np.arange(outputs.n_local)
+    else:
+        columns = _states_last(outputs.n_common, outputs.n_local, model.by_start.shape[1])
         Q_slopes, P_slopes = (np.ascontiguousarray(x.transpose(1, 2, 0)) for x in (by.Q, by.P))
-        slopes = replace(slopes, Q_slopes=Q_slopes, P_slopes=P_slopes)
-    return filter_intermittent(slopes, problem.drives[number], problem.maneuvers[number])
+        equations = replace(equations, Q_slopes=Q_slopes, P_slopes=P_slopes)
+    equations = replace(equations, model=model.by(columns))
+    return filter_intermittent(equations, outputs.drive(number), problem.maneuvers[number])
 
 
 def _states_last(common: int, local: int, width: int) -> IntArray:

@@ -15,7 +15,7 @@ from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.equation_recursion import simulate_equations, simulate_with_slopes
 from host.sysid.numerics.fractional_delay import delay_columns, slope_by_delay
-from host.sysid.numerics.output_error_problem import OutputProblem, Response
+from host.sysid.numerics.output_error_problem import OutputProblem
 
 MOST_SUBSTEPS = 64
 # Of an output's spread: what halving the step may move it by. Noise is a thousandth at least
@@ -68,9 +68,7 @@ class NonlinearProblem(OutputProblem):
         self.column = np.array(
             [*(place.get(name, -1) for name in self.source.parameters), -1], dtype=np.int64
         )
-        self.bias_column = np.full(len(model.states), -1, dtype=np.int64)
-        for k, state in enumerate(model.state_biases):
-            self.bias_column[model.states.index(state)] = self.n_common + k
+        self.bias_column, self.offset_column = self._sampler.rate, self._sampler.offset
         delay = {y: k for k, d in enumerate(model.delays, len(model.parameters)) for y in d.outputs}
         self.input_column = np.array([delay.get(u, -1) for u in model.inputs], dtype=np.int64)
         self.substeps = 1
@@ -102,7 +100,7 @@ class NonlinearProblem(OutputProblem):
             )
             known = measured | self.source.first_states(measured)
             for state in model.initial_states:
-                k = self._start_parameter[model.states.index(state)]
+                k = self._sampler.first[model.states.index(state)]
                 theta[part.index[k]] = known.get(state, 0.0)
             own = part.index[self.first_own :]
             theta[own] = [p.start for p in model.own_parameters]
@@ -129,73 +127,36 @@ class NonlinearProblem(OutputProblem):
                     f"{error}, at the start values of model {self.model.name}"
                 ) from None
 
-    def respond(self, theta: Array) -> list[Response] | None:
-        """Simulate every maneuver with sensitivities; None if a response diverges."""
-        self.choose_step(theta)
-        result = []
-        for number, part in enumerate(self._parts):
-            g = self.given(number, theta)
-            samples, n = len(g.inputs), len(self.model.states)
-            x, y = np.empty((samples, n)), np.empty((samples, len(self.model.outputs)))
-            slope = self._memory_for(number, (len(self.model.outputs), samples, self._width))
-            if not finite(
-                self._with_slopes, g.start, self._start_slopes, g.inputs, g.held, g.shift,
-                g.input_slopes, self.input_column, g.parameters, self.column, self.constants,
-                self.tables, g.bias, self.bias_column, part.dt_s, self.substeps, self.ramp,
-                x, y, slope,
-            ):  # fmt: skip
-                return None
-            out = self._with_biases(y, g.local)
-            for j in np.flatnonzero(self._bias_parameter >= 0):
-                slope[j, :, self._bias_parameter[j]] += 1.0
-            self._delay(out, slope, g.local, part.dt_s)
-            if part.missing is not None:
-                slope[part.missing] = 0.0  # what was not measured tells nothing
-            result.append(Response(out, slope))
-        return result
-
-    def outputs(self, theta: Array) -> list[Array] | None:
-        """Simulate without sensitivities: outputs (p, samples) per maneuver, None if divergent."""
-        self.choose_step(theta)
-        found = self.simulated(theta, self.substeps, self.ramp)
-        return None if found is None else [y for y, _ in found]
-
-    def simulated(
-        self, theta: Array, substeps: int, ramp: float
-    ) -> list[tuple[Array, Array]] | None:
-        """Return outputs (p, samples) and states (samples, n) of each maneuver.
-
-        Parameters
-        ----------
-        theta : Array
-        substeps : int
-            Runge-Kutta steps from sample to sample.
-        ramp : float
-            1 for first-order hold of the inputs, 0 for zero-order hold.
-
-        Returns
-        -------
-        list or None
-            None if one diverges.
-        """
-        result: list[tuple[Array, Array]] = []
-        for number, part in enumerate(self._parts):
-            g = self.given(number, theta)
-            x = np.empty((len(g.inputs), len(self.model.states)))
-            y = np.empty((len(g.inputs), len(self.model.outputs)))
-            if not finite(
+    def _simulated(
+        self, number: int, theta: Array, slope: Array | None
+    ) -> tuple[Array, Array] | None:
+        """Do the same, by steps between samples."""
+        g, dt_s = self.given(number, theta), self._parts[number].dt_s
+        x = np.empty((len(g.inputs), len(self.model.states)))
+        y = np.empty((len(g.inputs), len(self.model.outputs)))
+        if slope is None:
+            run = finite(
                 self._simulate, g.start, g.inputs, g.held, g.shift, g.parameters, self.constants,
-                self.tables, g.bias, part.dt_s, substeps, ramp, x, y,
-            ):  # fmt: skip
-                return None
-            out = self._with_biases(y, g.local)
-            self._delay(out, np.zeros((len(out), 0, 0)), g.local, part.dt_s)
-            result.append((out, x))
-        return result
+                self.tables, g.bias, dt_s, self.substeps, self.ramp, x, y,
+            )  # fmt: skip
+        else:
+            run = finite(
+                self._with_slopes, g.start, self._sampler.by_start, g.inputs, g.held, g.shift,
+                g.input_slopes, self.input_column, g.parameters, self.column, self.constants,
+                self.tables, g.bias, self.bias_column, dt_s, self.substeps, self.ramp, x, y, slope,
+            )  # fmt: skip
+        if not run:
+            return None
+        out = np.ascontiguousarray(y.T)
+        out += self.output_offsets(g.local)[:, None]
+        if slope is not None:
+            for j in np.flatnonzero(self.offset_column >= 0):
+                slope[j, :, self.offset_column[j]] += 1.0
+        return out, x
 
     def model_at(self, theta: Array) -> LinearModel:
         """Return the model with the tangent at the mean of its simulated states."""
-        found = self.simulated(theta, self.substeps, self.ramp)
+        found = self.simulated(theta)
         if found is None:
             return self.model
         x = np.concatenate([states for _, states in found]).mean(axis=0)
@@ -206,7 +167,7 @@ class NonlinearProblem(OutputProblem):
     def given(self, number: int, theta: Array) -> Given:
         """Return the arguments of the simulation of one maneuver at a parameter vector."""
         part = self._parts[number]
-        local = np.append(theta[part.index], 0.0)  # an index of -1 reads the last
+        local = self.local(number, theta)
         held = inputs = np.ascontiguousarray(self.maneuvers[number].inputs)
         slopes, shifts = np.zeros_like(inputs), np.zeros(inputs.shape[1])
         if (self.input_column >= 0).any():
@@ -219,7 +180,7 @@ class NonlinearProblem(OutputProblem):
                 slopes[:, j] = slope_by_delay(at_once, shift)[:, 0] / part.dt_s
         return Given(
             local=local,
-            start=self._known_start + local[self._start_parameter],
+            start=self._sampler.start(local),
             inputs=inputs,
             held=held,
             shift=shifts,
@@ -230,12 +191,7 @@ class NonlinearProblem(OutputProblem):
 
     def output_offsets(self, local: Array) -> Array:
         """Return the biases of the outputs among the unknowns of a maneuver, (p,)."""
-        return np.asarray(local[self._bias_parameter])
-
-    def _with_biases(self, y: Array, local: Array) -> Array:
-        out = np.ascontiguousarray(y.T)
-        out += self.output_offsets(local)[:, None]
-        return out
+        return np.asarray(local[self.offset_column])
 
     def choose_step(self, theta: Array) -> None:
         """Halve the step until that moves no output any more; once, where the model is finite."""
@@ -249,11 +205,12 @@ class NonlinearProblem(OutputProblem):
         """
         spread = np.std(np.hstack([part.measured for part in self._parts]), axis=1)
         limit = STEP_TOLERANCE * np.maximum(spread, np.sqrt(self.least_variance))
-        substeps = self.substeps
-        coarse = self.simulated(theta, substeps, self.ramp)
+        begun = chosen = self.substeps
+        coarse = self.simulated(theta)
         compared = False
-        while substeps < MOST_SUBSTEPS:
-            fine = self.simulated(theta, 2 * substeps, self.ramp)
+        while chosen < MOST_SUBSTEPS:
+            self.substeps = 2 * chosen
+            fine = self.simulated(theta)
             if fine is not None and coarse is not None:
                 compared = True
                 moved = [
@@ -262,12 +219,10 @@ class NonlinearProblem(OutputProblem):
                 ]
                 if np.all(np.max(moved, axis=0) <= limit):
                     break
-            coarse, substeps = fine, 2 * substeps
-        if not compared or substeps == self.substeps:
-            self._stepped |= compared
-            return False
-        self._stepped, self.substeps = True, substeps
-        return True
+            coarse, chosen = fine, self.substeps
+        self._stepped |= compared
+        self.substeps = chosen if compared else begun
+        return self.substeps != begun
 
 
 def finite(run: Callable[..., bool], *given: object) -> bool:

@@ -10,10 +10,10 @@ import numpy as np
 from host.arrays import Array, BoolArray, IntArray
 from host.errors import IdentificationError
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import EntryTable, LinearModel
-from host.sysid.numerics.discretisation import discretise
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.fractional_delay import delay_columns, slope_by_delay
 from host.sysid.numerics.recursion import propagate, simulate
+from host.sysid.numerics.sampled_model import SampledModel, Sampler
 
 # Of an output's motion: no column is better than this, nor the model of it. Without noise in one
 # column its information drowned that of all others, and 73 to 93 % of the intervals held.
@@ -77,7 +77,7 @@ class OutputProblem:
             raise IdentificationError("no maneuver to fit: give at least one")
         self.model = model
         self.maneuvers = tuple(maneuvers)
-        n, m = len(model.states), len(model.inputs)
+        self._sampler = Sampler(model)
         common = len(model.parameter_names)
         self.n_common = common
         local = model.local_names(1)
@@ -88,14 +88,9 @@ class OutputProblem:
             begin = len(names)
             names.extend(model.local_names(number))
             index = np.concatenate([np.arange(common), np.arange(begin, len(names))])
-            one = np.ones((maneuver.samples, 1))
-            columns = [maneuver.inputs, one]
-            if model.hold == "foh":
-                increments = np.diff(maneuver.inputs, axis=0, append=maneuver.inputs[-1:])
-                columns.append(increments)
             self._parts.append(
                 _Part(
-                    drive=np.ascontiguousarray(np.hstack(columns)),
+                    drive=self._sampler.drive(maneuver),
                     measured=np.ascontiguousarray(maneuver.outputs.T),
                     missing=None if maneuver.sampled is None else ~maneuver.sampled.T,
                     index=index.astype(np.int64),
@@ -104,55 +99,6 @@ class OutputProblem:
             )
         self.names = tuple(names)
         self.n_local = len(local)
-        width = common + len(local)
-        state_entries = model.entries("AB")
-        n_rates = len(model.state_biases)
-        self._entries = EntryTable(
-            row=np.concatenate(
-                [
-                    state_entries.row,
-                    np.array([model.states.index(s) for s in model.state_biases], dtype=np.int64),
-                ]
-            ),
-            column=np.concatenate([state_entries.column, np.full(n_rates, n + m, dtype=np.int64)]),
-            parameter=np.concatenate(
-                [state_entries.parameter, np.arange(common, common + n_rates, dtype=np.int64)]
-            ),
-            gain=np.concatenate([state_entries.gain, np.ones(n_rates)]),
-        )
-        self._bias_parameter = np.full(len(model.outputs), -1, dtype=np.int64)
-        for k, output in enumerate(model.output_biases):
-            self._bias_parameter[model.outputs.index(output)] = common + n_rates + k
-        self._start_parameter = np.full(n, -1, dtype=np.int64)
-        for k, state in enumerate(model.initial_states):
-            position = common + n_rates + len(model.output_biases) + k
-            self._start_parameter[model.states.index(state)] = position
-        own = [p.name for p in model.parameters]
-        for state, name in model.shared_starts:
-            self._start_parameter[model.states.index(state)] = own.index(name)
-        self._known_start = np.zeros(n)
-        for state, value in model.known_starts:
-            self._known_start[model.states.index(state)] = value
-        self._start_slopes = np.zeros((n, width))
-        for i in np.flatnonzero(self._start_parameter >= 0):
-            self._start_slopes[i, self._start_parameter[i]] = 1.0
-        output_entries = model.entries("CD")
-        free_output = len(output_entries.row) + len(model.accelerometer_offsets) > 0
-        self._offsets = [
-            (
-                model.outputs.index(lever.output),
-                model.states.index(lever.state),
-                [p.name for p in model.parameters].index(lever.parameter),
-                lever.gain,
-            )
-            for lever in model.accelerometer_offsets
-        ]
-        self._CD_slopes = np.zeros((len(model.outputs) if free_output else 0, n + m, width))
-        for k in range(len(output_entries.row)):
-            self._CD_slopes[
-                output_entries.row[k], output_entries.column[k], output_entries.parameter[k]
-            ] += output_entries.gain[k]
-        self._width = width
         self._free_memory: list[list[Array]] = [[] for _ in self._parts]
         power = np.mean(np.square(self._parts[0].measured), axis=1)
         self.least_variance = 1e-20 * np.maximum(power, 1e-30)  # of an output that fits perfectly
@@ -245,60 +191,89 @@ class OutputProblem:
         """Return the model that matrices are taken from at an estimate."""
         return self.model
 
+    def drive(self, maneuver: int) -> Array:
+        """Return what drives the model over a maneuver, (samples, w)."""
+        return self._parts[maneuver].drive
+
+    def local(self, maneuver: int, theta: Array) -> Array:
+        """Return the unknowns of a maneuver, and a zero behind them."""
+        return np.append(theta[self._parts[maneuver].index], 0.0)
+
+    def sampled(self, maneuver: int, theta: Array, *, slopes: bool = True) -> SampledModel:
+        """Return the model over one sample of a maneuver, its slopes by `columns`."""
+        dt_s = self._parts[maneuver].dt_s
+        return self._sampler.at(self.local(maneuver, theta), dt_s, slopes=slopes)
+
     def respond(self, theta: Array) -> list[Response] | None:
-        """Simulate every maneuver with sensitivities; None if a response diverges.
+        """Simulate every maneuver with sensitivities; None if a response diverges."""
+        self.choose_step(theta)
+        result = []
+        for number, part in enumerate(self._parts):
+            shape = (*part.measured.shape, self._sampler.width)
+            slope = self._memory_for(number, shape)
+            found = self._delayed(number, theta, slope)
+            if found is None:
+                return None
+            if part.missing is not None:
+                slope[part.missing] = 0.0  # what was not measured tells nothing
+            result.append(Response(found[0], slope))
+        return result
+
+    def outputs(self, theta: Array) -> list[Array] | None:
+        """Simulate without sensitivities: outputs (p, samples) per maneuver, None if divergent."""
+        self.choose_step(theta)
+        found = self.simulated(theta)
+        return None if found is None else [y for y, _ in found]
+
+    def simulated(self, theta: Array) -> list[tuple[Array, Array]] | None:
+        """Return outputs (p, samples) and states (samples, n) of each maneuver; None if divergent.
+
+        Steps between samples are as long as they were chosen.
+        """
+        result: list[tuple[Array, Array]] = []
+        for number in range(len(self._parts)):
+            found = self._delayed(number, theta, None)
+            if found is None:
+                return None
+            result.append(found)
+        return result
+
+    def _delayed(
+        self, number: int, theta: Array, slope: Array | None
+    ) -> tuple[Array, Array] | None:
+        """Return outputs, as late as they are, and states of a maneuver; None if it diverges.
+
+        Sensitivities of the outputs overwrite `slope` (p, samples, L).
+        """
+        found = self._simulated(number, theta, slope)
+        if found is not None:
+            self._delay(found[0], slope, self.local(number, theta), self._parts[number].dt_s)
+        return found
+
+    def _simulated(
+        self, number: int, theta: Array, slope: Array | None
+    ) -> tuple[Array, Array] | None:
+        """Do the same for outputs that are not late.
 
         The sensitivities obey dx/dtheta[k+1] = Phi dx/dtheta[k] + d[Phi Gamma]/dtheta z[k]
         (EQUATIONS.md, eq. 25).
         """
-        model = self.model
-        n, m = len(model.states), len(model.inputs)
-        A, B, C, D = model.matrices(theta)
-        AB = np.zeros((n, n + m + 1))
-        AB[:, :n], AB[:, n : n + m] = A, B
-        CD = np.hstack([C, D])
-        CD_slopes = self._with_offsets(AB[:, :-1], theta)
-        result = []
-        for number, part in enumerate(self._parts):
-            local = np.append(theta[part.index], 0.0)  # an index of -1 reads the last
-            AB[:, -1] = 0.0
-            for k, state in enumerate(model.state_biases):
-                AB[model.states.index(state), -1] = local[self.n_common + k]
-            step, slopes = discretise(
-                AB,
-                n,
-                m,
-                model.hold == "foh",
-                part.dt_s,
-                self._entries.row,
-                self._entries.column,
-                self._entries.parameter,
-                self._entries.gain,
-                self._width,
-            )
-            finite, z = simulate(
-                step,
-                part.drive,
-                self._known_start + local[self._start_parameter],
-            )
-            if not finite:
-                return None
-            y = CD @ z[:, : n + m].T
-            y += local[self._bias_parameter][:, None]
-            slope = self._memory_for(number, (len(C), len(z), self._width))
-            propagate(step, slopes, z, C, self._start_slopes, slope)
-            for j in np.flatnonzero(self._bias_parameter >= 0):
-                slope[j, :, self._bias_parameter[j]] += 1.0
-            for row, output_slope in enumerate(CD_slopes):
-                slope[row] += z[:, : n + m] @ output_slope
-            self._delay(y, slope, local, part.dt_s)
-            if part.missing is not None:
-                slope[part.missing] = 0.0  # what was not measured tells nothing
-            result.append(Response(y, slope))
-        return result
+        s = self.sampled(number, theta, slopes=slope is not None)
+        finite, z = simulate(s.step, self._parts[number].drive, s.start)
+        if not finite:
+            return None
+        if slope is not None:
+            propagate(s.step, s.by_step, z, s.C, s.by_start, slope)
+            for own, by_row in zip(slope, s.by_read, strict=True):
+                free = np.flatnonzero(by_row.any(axis=0))
+                own[:, free] += z @ by_row[:, free]
+        return s.read @ z.T, z[:, : len(s.start)]
 
     def check_start(self, theta: Array) -> None:
         """Refuse a start where equations have no value; a linear model has one everywhere."""
+
+    def choose_step(self, theta: Array) -> None:
+        """Choose how long steps between samples are; a linear model takes none."""
 
     def refine_step(self, theta: Array) -> bool:
         """Return whether steps between samples were too long here; a linear model takes none."""
@@ -316,49 +291,7 @@ class OutputProblem:
         spare = self._free_memory[number]
         return spare.pop() if spare else np.empty(shape)
 
-    def _with_offsets(self, AB: Array, theta: Array) -> Array:
-        """Return derivatives of [C D]; an offset adds a state equation to an output."""
-        if not self._offsets:
-            return self._CD_slopes
-        slopes = self._CD_slopes.copy()
-        entries = self._entries
-        for output, state, parameter, gain in self._offsets:
-            slopes[output, :, parameter] += gain * AB[state]
-            for t in np.flatnonzero(entries.row == state):
-                if entries.column[t] < AB.shape[1]:
-                    slopes[output, entries.column[t], entries.parameter[t]] += (
-                        gain * theta[parameter] * entries.gain[t]
-                    )
-        return slopes
-
-    def outputs(self, theta: Array) -> list[Array] | None:
-        """Simulate without sensitivities: outputs (p, samples) per maneuver, None if divergent."""
-        model = self.model
-        n, m = len(model.states), len(model.inputs)
-        A, B, C, D = model.matrices(theta)
-        AB = np.zeros((n, n + m + 1))
-        AB[:, :n], AB[:, n : n + m] = A, B
-        none = np.zeros(0, dtype=np.int64)
-        result: list[Array] = []
-        for part in self._parts:
-            local = np.append(theta[part.index], 0.0)  # an index of -1 reads the last
-            AB[:, -1] = 0.0
-            for k, state in enumerate(model.state_biases):
-                AB[model.states.index(state), -1] = local[self.n_common + k]
-            step, _ = discretise(
-                AB, n, m, model.hold == "foh", part.dt_s, none, none, none, np.zeros(0), 0
-            )
-            start = self._known_start + local[self._start_parameter]
-            finite, z = simulate(step, part.drive, start)
-            if not finite:
-                return None
-            y = np.hstack([C, D]) @ z[:, : n + m].T
-            y += local[self._bias_parameter][:, None]
-            self._delay(y, np.zeros((len(y), 0, 0)), local, part.dt_s)
-            result.append(y)
-        return result
-
-    def _delay(self, y: Array, slope: Array, local: Array, dt_s: float) -> None:
+    def _delay(self, y: Array, slope: Array | None, local: Array, dt_s: float) -> None:
         for k, delay in enumerate(self.model.delays, start=len(self.model.parameters)):
             shift = local[k] / dt_s
             for output in delay.outputs:
@@ -367,7 +300,7 @@ class OutputProblem:
                 j = self.model.outputs.index(output)
                 at_once = y[j][:, None].copy()
                 y[j] = delay_columns(at_once, shift)[:, 0]
-                if slope.shape[1] == 0:
+                if slope is None:
                     continue
                 if shift != 0.0:
                     slope[j] = delay_columns(slope[j], shift)

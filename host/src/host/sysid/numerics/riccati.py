@@ -6,6 +6,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.numerics.recursion import simulate
+from host.sysid.numerics.sampled_model import SampledModel
 
 DOUBLINGS = 40
 
@@ -55,29 +56,20 @@ def predicted_covariance(F: Array, C: Array, Q: Array, R: Array) -> tuple[bool, 
     return False, H
 
 
-def filter_innovations(
-    step: Array, CD: Array, K: Array, drive: Array, y: Array, start: Array, bias: Array
-) -> tuple[bool, Array]:
+def filter_innovations(model: SampledModel, K: Array, drive: Array, y: Array) -> tuple[bool, Array]:
     """Run a constant-gain Kalman filter.
 
-    x[k+1] = Phi (x[k] + K nu[k]) + Gamma u[k] with the innovation nu[k] = y[k] - C x[k] - D u[k] -
-    b (EQUATIONS.md, eq. 28).
+    x[k+1] = Phi (x[k] + K nu[k]) + Gamma u[k] with the innovation nu[k] = y[k] - C x[k] - D u[k]
+    (EQUATIONS.md, eq. 28).
 
     Parameters
     ----------
-    step : Array, shape (n, n + w)
-        [Phi Gamma].
-    CD : Array, shape (p, n + inputs)
-        [C D].
+    model : SampledModel
+        Its start is the predicted state of the first sample.
     K : Array, shape (n, p)
         Gain of the measurement.
     drive : Array, shape (samples, w)
-        The inputs come first.
     y : Array, shape (samples, p)
-    start : Array, shape (n,)
-        Predicted state of the first sample.
-    bias : Array, shape (p,)
-        Of the outputs.
 
     Returns
     -------
@@ -86,13 +78,12 @@ def filter_innovations(
     Array, shape (samples, n + w + p)
         Predicted state, drive and innovation of every sample.
     """
-    n = len(start)
-    inputs = CD.shape[1] - n
-    C, measured_part = CD[:, :n], y - bias - drive[:, :inputs] @ CD[:, n:].T
+    n, C = len(model.start), model.C
+    measured_part = y - drive @ model.read[:, n:].T
     # The filter as one recursion: nu = measured_part - C x.
-    FK = step[:, :n] @ K
-    closed_loop = np.hstack([step[:, :n] - FK @ C, step[:, n:], FK])
-    finite, z = simulate(closed_loop, np.hstack([drive, measured_part]), start)
+    FK = model.step[:, :n] @ K
+    closed_loop = np.hstack([model.step[:, :n] - FK @ C, model.step[:, n:], FK])
+    finite, z = simulate(closed_loop, np.hstack([drive, measured_part]), model.start)
     if finite:
         z[:, -len(C) :] -= z[:, :n] @ C.T
     return finite, z
