@@ -22,7 +22,7 @@ import pandas as pd
 from host.compiled import prefer_machine_code
 from host.errors import IdentificationError
 from host.instrument.instrument_errors import usual_errors
-from host.instrument.recording import FOREIGN
+from host.physical.recording import FOREIGN
 from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.flight.linear_estimator import identify

@@ -28,7 +28,7 @@ from host.instrument.instrument_errors import (
     instrument_errors,
     standard_errors,
 )
-from host.instrument.recording import AUTOPILOT
+from host.physical.recording import AUTOPILOT
 from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.pipeline.aircraft_data import aircraft_data

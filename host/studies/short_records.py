@@ -17,7 +17,7 @@ from host.arrays import Array
 from host.compiled import prefer_machine_code
 from host.constants import GRAVITY_MPS2
 from host.errors import IdentificationError
-from host.instrument.recording import FOREIGN
+from host.physical.recording import FOREIGN
 from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.flight.linear_estimator import identify

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from host.arrays import Array
 from host.compiled import prefer_machine_code
-from host.instrument.recording import FOREIGN
+from host.physical.recording import FOREIGN
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.models.templates import Trim, template

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from host.compiled import prefer_machine_code
 from host.errors import IdentificationError
-from host.instrument.recording import FOREIGN
+from host.physical.recording import FOREIGN
 from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.flight.linear_answer import Answer

@@ -15,8 +15,8 @@ from host.instrument.instrument_errors import (
     instrument_errors,
     standard_errors,
 )
-from host.instrument.recording import Recording
 from host.physical.calibration import load_calibration
+from host.physical.recording import Recording
 from host.resources import resource
 from host.sysid.compatibility.path_preparation import prior
 from host.sysid.flight.flight_tables import FlightColumns

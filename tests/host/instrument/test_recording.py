@@ -11,8 +11,8 @@ from host.aircraft.mass_properties import airframe_data
 from host.arrays import Array
 from host.constants import NORMAL_95
 from host.instrument.deviations import SensorErrorModel, deviations, sensor_error_model
-from host.instrument.recording import SURFACES, Recording
 from host.physical.calibration import load_calibration
+from host.physical.recording import SURFACES, Recording
 from host.resources import resource
 from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct

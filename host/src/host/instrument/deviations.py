@@ -18,8 +18,8 @@ from host.instrument.instrument_errors import (
     standard_errors,
     usual_errors,
 )
-from host.instrument.recording import FOREIGN, OWN, Recording
 from host.physical.calibration import Calibration
+from host.physical.recording import FOREIGN, OWN, Recording
 
 LEAST_LAG_S = 1e-5  # stands for no low-pass at all, so that its bandwidth stays finite
 LEAST_CLOCK_SHARE = 1e-5  # GPS leaves 0.2 ppm, far too little to change an interval

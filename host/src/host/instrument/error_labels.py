@@ -6,7 +6,7 @@ import math
 
 from host.constants import NORMAL_95
 from host.instrument.deviations import SensorErrorModel, clock_share
-from host.instrument.recording import FOREIGN
+from host.physical.recording import FOREIGN
 
 ERROR_LABELS = {
     "mass_share": "mass", "ixx_share": "Ixx", "iyy_share": "Iyy", "izz_share": "Izz",

@@ -15,8 +15,8 @@ from pathlib import Path
 
 from host.aircraft.file import Aircraft
 from host.errors import CalibrationError
-from host.instrument.recording import OWN, SURFACES
 from host.physical.calibration import Calibration, Line
+from host.physical.recording import OWN, SURFACES
 
 STANDARD = Path(__file__).with_name("standard.toml")
 UNIFORM_SD_PER_HALF_WIDTH = 1.0 / math.sqrt(3.0)  # "even" in the files

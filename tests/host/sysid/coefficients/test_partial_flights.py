@@ -11,7 +11,7 @@ from host.aircraft.file import load_measured
 from host.aircraft.powerplant import powerplant
 from host.aircraft.propulsion import propeller
 from host.errors import IdentificationError
-from host.instrument.recording import SURFACES
+from host.physical.recording import SURFACES
 from host.sysid.coefficients.coefficient_model import read_coefficient_model
 from host.sysid.flight.even_grid import even_columns
 from host.twin.testcard.cards import load

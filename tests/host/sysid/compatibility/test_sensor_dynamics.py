@@ -7,7 +7,7 @@ import pytest
 from host.aircraft.mass_properties import AirframeData
 from host.instrument.deviations import sensor_error_model
 from host.instrument.error_labels import ERROR_LABELS
-from host.instrument.recording import AUTOPILOT, FOREIGN, Recording
+from host.physical.recording import AUTOPILOT, FOREIGN, Recording
 from host.sysid import Maneuver
 from host.sysid.compatibility.path_preparation import compensate_lowpass
 from host.sysid.compatibility.reconstruction import Compatibility, SensorErrorEstimate

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from host.instrument.deviations import unknown_sensors
 from host.instrument.error_labels import recording_notes
-from host.instrument.recording import Recording
+from host.physical.recording import Recording
 from host.sysid.compatibility.path_preparation import prior
 
 

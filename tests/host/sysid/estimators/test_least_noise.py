@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.instrument.deviations import sensor_error_model
-from host.instrument.recording import FOREIGN, OWN
+from host.physical.recording import FOREIGN, OWN
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.estimators.filter_error import fit_filter_error
 from host.sysid.estimators.gust_model import gust_model

@@ -5,7 +5,7 @@ Two parameters that are right beside it stay as they are known.
 
 import numpy as np
 import pytest
-from host.instrument.recording import FOREIGN
+from host.physical.recording import FOREIGN
 from host.sysid.answer.marks import TRUSTED
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.flight.linear_answer import Answer

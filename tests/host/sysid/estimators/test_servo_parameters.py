@@ -11,8 +11,8 @@ import pytest
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.instrument.deviations import unknown_sensors
-from host.instrument.recording import Recording
 from host.instrument.servo_prior import ServoPrior, servo_prior
+from host.physical.recording import Recording
 from host.sysid.compatibility.servo_response import behind_servos
 from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.servo_parameters import (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from host.instrument.deviations import airspeed_share
 from host.instrument.instrument_errors import usual_errors
-from host.instrument.recording import AUTOPILOT, FOREIGN, OWN
+from host.physical.recording import AUTOPILOT, FOREIGN, OWN
 from host.sysid.answer.marks import TRUSTED
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.flight.linear_answer import Answer

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from host.instrument.deviations import sensor_error_model
-from host.instrument.recording import AUTOPILOT, FOREIGN, OWN
+from host.physical.recording import AUTOPILOT, FOREIGN, OWN
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.flight.column_sampling import sampled_name
 from host.sysid.flight.filter_step import with_filter_step

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from host.instrument.deviations import unknown_sensors
-from host.instrument.recording import FOREIGN, Recording
 from host.physical.calibration import load_calibration
+from host.physical.recording import FOREIGN, Recording
 from host.sysid.answer.marks import TRUSTED
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.compatibility.reconstruction import by_calibration_alone

@@ -6,7 +6,7 @@ The trainer of another simulator, airspeed varying by what the inputs do.
 import numpy as np
 import pytest
 from host.instrument.instrument_errors import usual_errors
-from host.instrument.recording import FOREIGN
+from host.physical.recording import FOREIGN
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import identify
 from studies.foreign.flight import Air, derivatives, fly

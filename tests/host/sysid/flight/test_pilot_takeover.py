@@ -3,7 +3,7 @@
 import pytest
 from host.arrays import Array
 from host.instrument.instrument_errors import usual_errors
-from host.instrument.recording import FOREIGN
+from host.physical.recording import FOREIGN
 from host.sysid.flight import linear_intervals
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_detection import detect_maneuvers

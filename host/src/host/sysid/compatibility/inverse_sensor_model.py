@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel
-from host.instrument.recording import SURFACES
+from host.physical.recording import SURFACES
 
 PASS_HZ, STOP_HZ = 9.0, 13.0
 FIT_RATE_HZ = 33.0  # signals end at 13 Hz; a fit takes a third of the time

@@ -17,7 +17,7 @@ from host.instrument.deviations import (
     unknown_sensors,
     vane_delay_s,
 )
-from host.instrument.recording import FOREIGN
+from host.physical.recording import FOREIGN
 from host.sysid.compatibility.flight_path import (
     AIR,
     DELAY_DIFFERENCE,

@@ -17,7 +17,7 @@ from host.arrays import Array
 from host.constants import NORMAL_95
 from host.instrument.deviations import SensorErrorModel
 from host.instrument.deviations import deviations as prior_deviations
-from host.instrument.recording import SURFACES
+from host.physical.recording import SURFACES
 from host.sysid.compatibility.flight_path import AIR, DELAYS
 from host.sysid.compatibility.path_preparation import (
     NO_OFFSETS,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from host.instrument.recording import AUTOPILOT, SURFACES, Recording
+from host.physical.recording import AUTOPILOT, SURFACES, Recording
 from host.readers.autopilot_flight import CLOCK_SHARE, AutopilotFlight, read_autopilot
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.foreign_tables import Foreign

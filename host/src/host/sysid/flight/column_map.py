@@ -27,8 +27,8 @@ from host.constants import GRAVITY_MPS2, RAD_PER_DEG
 from host.errors import IdentificationError
 from host.files.quantities import Quantity
 from host.files.user_text import read_toml
-from host.instrument.recording import SURFACES
 from host.near_names import like
+from host.physical.recording import SURFACES
 from host.sysid.flight.shipped_maps import is_shipped, map_file
 
 DEG, FOOT, POUND_PA = RAD_PER_DEG, 0.3048, 6894.757

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from host.instrument.recording import FOREIGN
+from host.physical.recording import FOREIGN
 from host.sysid.estimators.gust_penetration import ROLL_STATES
 from host.sysid.flight.column_sampling import sampled_name
 from host.sysid.flight.reconstructed_flight import FlownManeuver

@@ -15,8 +15,8 @@ import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.files.regular import file_or_folder
-from host.instrument.recording import Recording
 from host.physical.calibration import Calibration, load_calibration
+from host.physical.recording import Recording
 from host.readers.autopilot_flight import is_autopilot_log
 from host.sysid.flight.autopilot_table import autopilot_table
 from host.sysid.flight.column_map import listed, mapped, missing_lines, read_map

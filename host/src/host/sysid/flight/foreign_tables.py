@@ -13,8 +13,8 @@ import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.extras import install_hint
-from host.instrument.recording import Recording
 from host.physical.calibration import Calibration
+from host.physical.recording import Recording
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.text_table import HEAD_BYTES, read_text
 

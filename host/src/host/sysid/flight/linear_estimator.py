@@ -16,7 +16,7 @@ from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.instrument.instrument_errors import InstrumentErrors
-from host.instrument.recording import OWN
+from host.physical.recording import OWN
 from host.sysid.aerodynamics.coefficient_table import (
     Coefficient,
     coefficients,

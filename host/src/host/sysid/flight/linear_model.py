@@ -9,7 +9,7 @@ import numpy as np
 
 from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, deviations, unknown_sensors
-from host.instrument.recording import OWN
+from host.physical.recording import OWN
 from host.sysid.compatibility.path_preparation import NO_OFFSETS
 from host.sysid.estimators.start_values import regression_estimates
 from host.sysid.flight.filter_step import (

@@ -8,10 +8,10 @@ import numpy as np
 
 from host.constants import NORMAL_95
 from host.errors import IdentificationError
-from host.instrument.recording import SURFACES, Recording
 from host.original.row_table import NOTES, make_table
 from host.original.rows import LAYOUTS, looks_like_rows, read_rows
 from host.physical.calibration import load_calibration
+from host.physical.recording import SURFACES, Recording
 from host.sysid.flight.foreign_tables import Foreign
 
 _HEAD_BYTES = 4096

@@ -17,9 +17,9 @@ from host.arrays import Array, BoolArray
 from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel
 from host.instrument.instrument_errors import InstrumentErrors
-from host.instrument.recording import OWN, SURFACES
 from host.instrument.servo_prior import ServoPrior
 from host.near_names import like
+from host.physical.recording import OWN, SURFACES
 from host.sysid.compatibility.flow_angles import FlowAngles
 from host.sysid.compatibility.position_correction import transfer_to_cg
 from host.sysid.compatibility.reconstruction import Compatibility

@@ -17,7 +17,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.constants import NORMAL_95
-from host.instrument.recording import FOREIGN, SURFACES, Recording
+from host.physical.recording import FOREIGN, SURFACES, Recording
 
 if TYPE_CHECKING:
     from host.log import FlightLog

@@ -9,8 +9,8 @@ from host.aircraft.file import load_measured
 from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import NoPropulsionError, Powerplant, powerplant
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
-from host.instrument.recording import OWN
 from host.physical.calibration import Calibration, load_calibration
+from host.physical.recording import OWN
 from host.sysid.flight.flight_tables import FlightColumns
 
 

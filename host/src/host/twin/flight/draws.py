@@ -19,7 +19,7 @@ from host.instrument.instrument_errors import (
     instrument_errors,
     standard_errors,
 )
-from host.instrument.recording import SURFACES
+from host.physical.recording import SURFACES
 
 PITOT_PA_PER_COUNT = 4.8828125  # MPXV7002DP on a 10-bit converter, hw/calibration/default.toml
 VANES = ("alpha_a", "alpha_b", "beta_a", "beta_b")
