@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.decode.log_summary import calibration_note
+from host.log.calibration_note import calibration_note
 from host.errors import CalibrationError
 from host.physical.calibration import load_calibration
 from host.physical.columns import ANALOGUE, INERTIAL

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from host.log import FlightLog
+from host.log.calibration_note import calibration_note
 from host.log.quality import Quality, judge
 from host.physical.channels import constant_delay_us
-from host.physical.columns import ANALOGUE, COLUMNS, INERTIAL, RESTS_ON
+from host.physical.columns import ANALOGUE, INERTIAL
 from host.physical.session import Session
 from host.terminal import command_line
 from host.text import shown
@@ -72,18 +73,6 @@ def summarise(log: FlightLog) -> Json:
     }
 
 
-def calibration_note(log: FlightLog) -> Json:
-    """Return which calibration was used and which columns rest on default numbers."""
-    defaults = set(log.calibration.defaults())
-    return {
-        "name": log.calibration.name,
-        "date": log.calibration.date,
-        "default_columns": [
-            column.name for column in COLUMNS if defaults & set(_rests_on(log, column.name))
-        ],
-    }
-
-
 def delays_us(log: FlightLog) -> dict[str, float | str]:
     """Return the nominal sampling delays that the table removed, by column, microseconds."""
     out: dict[str, float | str] = {}
@@ -94,25 +83,6 @@ def delays_us(log: FlightLog) -> dict[str, float | str]:
     for name, (column, _, _) in INERTIAL.items():
         out[column] = constant_delay_us(frame.field(name), dlpf)
     return out
-
-
-def _rests_on(log: FlightLog, column: str) -> tuple[str, ...]:
-    for name, (own, line) in ANALOGUE.items():
-        del name
-        if own == column:
-            return (line,)
-    for own, kind, _ in INERTIAL.values():
-        if own == column:
-            return (f"imu.{kind}",)
-    surface = column.removesuffix("_rad")
-    if surface in log.inputs:
-        if log.inputs[surface] == "commanded":
-            return (f"pulse.{surface}",)
-        pots = {"aileron": ("channel.pot_aileron_left", "channel.pot_aileron_right")}
-        return pots.get(surface, (f"channel.pot_{surface}",))
-    if column == "throttle":
-        return ("pulse.throttle",)
-    return RESTS_ON.get(column, ())
 
 
 def _session(log: FlightLog, session: Session) -> Json:

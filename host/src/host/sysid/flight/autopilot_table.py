@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from host.physical.recording import AUTOPILOT, SURFACES, Recording
-from host.readers.autopilot_flight import CLOCK_SHARE, AutopilotFlight, read_autopilot
-from host.sysid.flight.data_finding import Finding
+from host.readers.autopilot_flight import CLOCK_SHARE, read_autopilot
 from host.sysid.flight.foreign_tables import Foreign
 
 
@@ -34,23 +33,5 @@ def autopilot_table(source: Path, sensors: Mapping[str, int] | None) -> Foreign:
         notes=flight.notes(),
         recording=Recording(commanded, CLOCK_SHARE, AUTOPILOT, flight.imu_lag_s),
         shares=shares,
-        findings=_slow_outputs(flight),
+        slow_outputs=flight.undersampled(),
     )
-
-
-def _slow_outputs(flight: AutopilotFlight) -> list[Finding]:
-    """Return a finding where a surface may have moved between two records of its output."""
-    slow = flight.undersampled()
-    if not slow:
-        return []
-    rates = ", ".join(f"{name} {rate:.0f} Hz" for name, rate in slow.items())
-    return [
-        Finding(
-            "surface-rate",
-            tuple(f"{name}_rad" for name in slow),
-            f"outputs are logged more slowly than servos get them ({rates}): when a surface moved"
-            " is known to a part of a step only",
-            ("a logging profile that writes outputs rarely", "a log received by radio"),
-            done="what lies between two records is drawn on a curve through four",
-        )
-    ]

@@ -172,7 +172,7 @@ def read_flight_columns(
         notes,
         found.recording,
         found.calibration,
-        [*found.findings, *seen.findings, *findings],
+        [*_slow_outputs(found.slow_outputs), *seen.findings, *findings],
         _resolutions(seen.sampling, even, columns),
         tuple(s for s in found.shares if f"{s}_rad" not in lines),
     )
@@ -184,6 +184,23 @@ def _measured(columns: dict[str, Array], notes: list[str], accept: Collection[st
     found = measured({k: v[index] for k, v in columns.items()}, SENSORS, LONGEST_GAP_S, accept)
     notes += found.notes
     return found
+
+
+def _slow_outputs(rates_hz: Mapping[str, float]) -> list[Finding]:
+    """Return a finding where a surface may have moved between two records of its output."""
+    if not rates_hz:
+        return []
+    rates = ", ".join(f"{name} {rate:.0f} Hz" for name, rate in rates_hz.items())
+    return [
+        Finding(
+            "surface-rate",
+            tuple(f"{name}_rad" for name in rates_hz),
+            f"outputs are logged more slowly than servos get them ({rates}): when a surface moved"
+            " is known to a part of a step only",
+            ("a logging profile that writes outputs rarely", "a log received by radio"),
+            done="what lies between two records is drawn on a curve through four",
+        )
+    ]
 
 
 def _resolutions(
@@ -298,7 +315,7 @@ def _of_log(log: FlightLog, columns: dict[str, Array], notes: list[str]) -> Fore
 
 def _columns_of(log: FlightLog, wanted: Collection[str]) -> tuple[dict[str, Array], list[str]]:
     """Return the columns of a log, and what is lost, uncalibrated or only commanded of them."""
-    from host.decode.log_summary import calibration_note
+    from host.log.calibration_note import calibration_note
 
     notes: list[str] = []
     raw: dict[str, Array] = {

@@ -15,7 +15,6 @@ from host.errors import IdentificationError
 from host.extras import install_hint
 from host.physical.calibration import Calibration
 from host.physical.recording import Recording
-from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.text_table import HEAD_BYTES, read_text
 
 if TYPE_CHECKING:
@@ -41,8 +40,8 @@ class Foreign:
 
     `twice` are names that several columns have; `recording` is what the source shows of itself,
     `calibration` what made the columns of a log; of an autopilot's log `shares` are the surfaces in
-    shares of full travel, `findings` what was found on reading it; `inputs` are those that our
-    logger flew itself.
+    shares of full travel, `slow_outputs` those whose output was logged more slowly than servos get
+    it, Hz; `inputs` are those that our logger flew itself.
     """
 
     columns: dict[str, Array] = field(default_factory=dict)
@@ -53,7 +52,7 @@ class Foreign:
     recording: Recording = field(default_factory=Recording)
     calibration: Calibration | None = None
     shares: tuple[str, ...] = ()
-    findings: list[Finding] = field(default_factory=list)
+    slow_outputs: dict[str, float] = field(default_factory=dict)
     inputs: Sequence[FlownInput] = ()
 
 
