@@ -18,9 +18,9 @@ import numpy as np
 from host.aircraft.mass_properties import airframe_data
 from host.constants import NORMAL_95
 from host.errors import IdentificationError
+from host.readers.even_grid import even_columns
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, identify_coefficients
-from host.sysid.flight.even_grid import even_columns
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.twin.sensors.sensor_delays import dlpf_for, sensor_delays

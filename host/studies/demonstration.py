@@ -13,9 +13,9 @@ import numpy as np
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.instrument.deviations import sensor_error_model
+from host.readers.even_grid import even_columns
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
-from host.sysid.flight.even_grid import even_columns
 from host.sysid.flight.linear_estimator import identify
 from host.twin.virtual import virtual_flight
 

@@ -18,12 +18,12 @@ from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
+from host.readers.even_grid import even_columns
+from host.readers.recorded import recording_of_table
 from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.compatibility.servo_response import surface_positions
-from host.sysid.flight.even_grid import even_columns
 from host.sysid.flight.linear_estimator import identify
-from host.sysid.flight.recorded import recording_of_table
 from host.twin.faults import Fault
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight

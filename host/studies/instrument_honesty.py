@@ -26,9 +26,9 @@ from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.instrument.instrument_errors import InstrumentErrors, instrument_errors
+from host.readers.even_grid import even_columns
 from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
-from host.sysid.flight.even_grid import even_columns
 from host.twin.testcard.cards import Card, load
 from host.twin.virtual import VirtualFlight, virtual_flight
 

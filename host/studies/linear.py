@@ -19,9 +19,9 @@ from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import powerplant
 from host.errors import IdentificationError
 from host.instrument.deviations import sensor_error_model
+from host.readers.even_grid import even_columns
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
-from host.sysid.flight.even_grid import even_columns
 from host.sysid.flight.linear_estimator import from_zero, identify
 from host.sysid.flight.linear_model import AXIS_OF, DEFAULT_METHOD
 from host.twin.virtual import VirtualFlight, virtual_flight

@@ -20,12 +20,12 @@ from host.errors import IdentificationError
 from host.instrument.deviations import sensor_error_model
 from host.planning.optimal_card import optimal_card, standard_card
 from host.planning.prior_range import random_aircraft
+from host.readers.even_grid import even_arrays
+from host.readers.foreign_tables import from_frame
+from host.readers.recorded import recording_of_table
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
-from host.sysid.flight.even_grid import even_arrays
-from host.sysid.flight.foreign_tables import from_frame
 from host.sysid.flight.linear_estimator import identify
-from host.sysid.flight.recorded import recording_of_table
 from host.twin.testcard.cards import BEFORE_S, Card, Pilot, Segment, duration_s
 from host.twin.virtual import virtual_flight
 

@@ -17,9 +17,9 @@ from host.aircraft.powerplant import powerplant
 from host.instrument.deviations import sensor_error_model
 from host.planning.card_planning import design
 from host.planning.predicted_widths import predict_widths
+from host.readers.even_grid import even_columns
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
-from host.sysid.flight.even_grid import even_columns
 from host.sysid.flight.linear_estimator import identify
 from host.twin.testcard.cards import Card, load
 from host.twin.virtual import virtual_flight

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
+from host.readers.even_grid import even_columns
 from host.sysid.estimators.equation_error import fit_equation_error
 from host.sysid.estimators.hopfield import SWEEPS, free_run, line_search, network
-from host.sysid.flight.even_grid import even_columns
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.models.diagnostics import (
     thesis_program_error_percent,

@@ -24,10 +24,10 @@ from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.instrument.deviations import sensor_error_model
+from host.readers.even_grid import even_columns
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.estimators.method_registry import fit
-from host.sysid.flight.even_grid import even_columns
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_detection import FLYING_SHARE, detect_maneuvers
 from host.sysid.flight.maneuver_selection import SURFACES, joined_windows, select_maneuvers

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.log.calibration_note import calibration_note
 from host.errors import CalibrationError
+from host.log.calibration_note import calibration_note
 from host.physical.calibration import load_calibration
 from host.physical.columns import ANALOGUE, INERTIAL
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from host.physical.sampling import Interpolator
-from host.sysid.flight.even_grid import even_arrays
+from host.readers.even_grid import even_arrays
 
 SHORT_PERIOD_HZ = 2.7
 

@@ -7,8 +7,8 @@ from host.aircraft.file import load
 from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
 from host.physical.calibration import load_calibration
+from host.readers.even_grid import even_columns
 from host.sysid.coefficients.coefficient_estimator import identify_coefficients
-from host.sysid.flight.even_grid import even_columns
 from host.twin.outcome.virtual_calibration import calibration
 from host.twin.virtual import virtual_flight
 

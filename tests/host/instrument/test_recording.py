@@ -13,13 +13,13 @@ from host.constants import NORMAL_95
 from host.instrument.deviations import SensorErrorModel, deviations, sensor_error_model
 from host.physical.calibration import load_calibration
 from host.physical.recording import SURFACES, Recording
+from host.readers.even_grid import even_columns
+from host.readers.recorded import recording_of_table
 from host.resources import resource
 from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.compatibility.servo_response import servo_response, surface_positions
-from host.sysid.flight.even_grid import even_columns
 from host.sysid.flight.linear_estimator import identify
-from host.sysid.flight.recorded import recording_of_table
 from host.twin.faults import Fault
 from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight

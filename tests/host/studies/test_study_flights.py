@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from host.readers.even_grid import even_columns
 from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.estimators.hopfield import free_run
-from host.sysid.flight.even_grid import even_columns
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import free_model
 from host.twin.virtual import VirtualFlight, virtual_flight

@@ -21,15 +21,15 @@ from host.arrays import Array
 from host.constants import NORMAL_95
 from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
+from host.readers.even_grid import even_arrays
+from host.readers.foreign_tables import from_frame
+from host.readers.recorded import recording_of_table
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
 from host.sysid.coefficients.coefficient_intervals import CoefficientIntervals
 from host.sysid.compatibility.reconstruction import reconstruct
-from host.sysid.flight.even_grid import even_arrays
-from host.sysid.flight.foreign_tables import from_frame
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import identify
-from host.sysid.flight.recorded import recording_of_table
 from host.twin.testcard.cards import Card
 from host.twin.virtual import virtual_flight
 

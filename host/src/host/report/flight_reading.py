@@ -24,6 +24,7 @@ from host.physical.columns import COLUMNS, UNITS
 from host.progress import progress_bar
 from host.readers.autopilot_flight import is_autopilot_log, read_autopilot
 from host.readers.autopilot_summary import autopilot_meta, summarise_autopilot, summary_lines
+from host.readers.even_grid import FITTED, even_arrays
 from host.report.gps_position import (
     calibration_values,
     changed_position,
@@ -31,7 +32,6 @@ from host.report.gps_position import (
     log_utc_s,
 )
 from host.report.shown_flight import Happening, ServoJump, ShownFlight, with_gaps
-from host.sysid.flight.even_grid import FITTED, even_arrays
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.maneuver_detection import (
     DetectedManeuver,

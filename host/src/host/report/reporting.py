@@ -13,12 +13,12 @@ from host.files.user_text import read_text
 from host.original.rows import looks_like_rows
 from host.preflight.preflight_sheet import sheet_beside, sheet_lines
 from host.readers.autopilot_flight import is_autopilot_log
+from host.readers.foreign_tables import TEXT_KINDS
 from host.report.flight_reading import FlightRequest, read_flight
 from host.report.plotting import page_file, write_text
 from host.report.provenance import hashes, versions
 from host.report.report_page import ReportParts, report_page
 from host.report.shown_flight import ShownFlight
-from host.sysid.flight.foreign_tables import TEXT_KINDS
 from host.sysid.pipeline.stages import identify
 
 if TYPE_CHECKING:

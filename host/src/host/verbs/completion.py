@@ -66,8 +66,8 @@ def run(args: argparse.Namespace) -> int:
 def known_names() -> dict[str, list[str]]:
     """Return the names that come with the package, by kind."""
     from host.aircraft.file import names as aircraft
+    from host.readers.shipped_maps import shipped_maps
     from host.sysid.flight.linear_model import AXIS_OF
-    from host.sysid.flight.shipped_maps import shipped_maps
     from host.sysid.models.thesis_models import shipped_models
     from host.sysid.pipeline.requested_models import COEFFICIENTS, known_methods
     from host.twin.testcard.cards import names as cards

@@ -37,11 +37,11 @@ def run(args: argparse.Namespace) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.errors import ExitCode, IdentificationError
     from host.readers.autopilot_flight import chosen_sensors
+    from host.readers.shipped_maps import LIST, map_lines
     from host.sysid.answer.json_document import json_text, maneuver_document
     from host.sysid.answer.maneuver_list import maneuver_lines
     from host.sysid.flight.flight_tables import read_columns
     from host.sysid.flight.linear_estimator import maneuvers_of
-    from host.sysid.flight.shipped_maps import LIST, map_lines
     from host.sysid.pipeline.arguments import option_words
 
     if str(args.map) == LIST:

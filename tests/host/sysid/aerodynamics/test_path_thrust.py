@@ -7,9 +7,9 @@ import pytest
 from host.aircraft.mass_properties import Condition, airframe_data
 from host.aircraft.powerplant import powerplant
 from host.constants import GRAVITY_MPS2
+from host.readers.even_grid import even_columns
 from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
 from host.sysid.aerodynamics.path_thrust import USUAL_DRAG, PathThrust, path_thrust
-from host.sysid.flight.even_grid import even_columns
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.state_space_model import free_model

@@ -15,6 +15,7 @@ from host.cli import main
 from host.errors import IdentificationError
 from host.export import toml as tomlout
 from host.instrument.deviations import sensor_error_model
+from host.readers.even_grid import even_columns
 from host.sysid.coefficients.coefficient_fit import CoefficientFit, Derivative
 from host.sysid.coefficients.coefficient_model import (
     CoefficientModel,
@@ -25,7 +26,6 @@ from host.sysid.coefficients.coefficient_model import (
 from host.sysid.coefficients.coefficient_search import fit_coefficients
 from host.sysid.coefficients.trim_derivatives import TrimMeans, derivatives_at_trim
 from host.sysid.coefficients.window_spectra import Window
-from host.sysid.flight.even_grid import even_columns
 from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight
 

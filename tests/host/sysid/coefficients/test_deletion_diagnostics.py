@@ -8,6 +8,7 @@ from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
+from host.readers.even_grid import even_columns
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
 from host.sysid.coefficients.coefficient_search import fit_coefficients
 from host.sysid.coefficients.deletion_diagnostics import (
@@ -29,7 +30,6 @@ from host.sysid.coefficients.window_spectra import (
     window_transform,
 )
 from host.sysid.compatibility.inverse_sensor_model import Spectrum
-from host.sysid.flight.even_grid import even_columns
 from host.sysid.numerics.maneuver_agreement import scatter_test
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from host.readers.column_sampling import quantum, sampling_of
 from host.sysid.estimators.filter_error_gust import SLOW_IN_CALM
-from host.sysid.flight.column_sampling import quantum, sampling_of
 from host.sysid.flight.flight_tables import read_flight_columns
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.templates import Trim, longitudinal

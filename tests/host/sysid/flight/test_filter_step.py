@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from host.instrument.deviations import sensor_error_model
 from host.physical.recording import AUTOPILOT, FOREIGN, OWN
+from host.readers.column_sampling import sampled_name
 from host.sysid.compatibility.reconstruction import Compatibility
-from host.sysid.flight.column_sampling import sampled_name
 from host.sysid.flight.filter_step import with_filter_step
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.linear_model import model_and_method

@@ -11,12 +11,12 @@ from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.aircraft.powerplant import powerplant
 from host.errors import IdentificationError
 from host.instrument.deviations import unknown_sensors
+from host.readers.even_grid import even_columns
 from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.start_values import regression_estimates, start_values
 from host.sysid.flight import gust_at_trim, linear_estimator
-from host.sysid.flight.even_grid import even_columns
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.linear_model import imu_place_m, without_attitude
 from host.sysid.flight.maneuver_detection import DetectedManeuver

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 from host.cli import main
-from host.sysid.flight.column_map import UNITS
+from host.readers.column_map import UNITS
 from host.sysid.flight.data_finding import CHECKS, Finding, open_channels
 from host.sysid.flight.finding_consequences import checked
 from host.sysid.flight.flight_tables import read_columns

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.cli import main
-from host.sysid.flight.derived_columns import derived_columns
+from host.readers.derived_columns import derived_columns
 from host.sysid.models.model_file import read_model
 from host.sysid.models.thesis_models import FOLDER, model_path, shipped_lines, shipped_models
 from host.sysid.pipeline.requested_models import requested_models

@@ -11,7 +11,7 @@ from host.arrays import Array
 from host.constants import DEG_PER_RAD
 from host.errors import IdentificationError
 from host.live.live_sample import LiveUpdate
-from host.sysid.flight.even_grid import BRIDGED, even_arrays
+from host.readers.even_grid import BRIDGED, even_arrays
 
 KEPT_S = 45.0
 NEAR = 0.6  # of a step: that far from an instant of the grid its row may be

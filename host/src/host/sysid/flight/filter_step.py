@@ -20,8 +20,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from host.physical.recording import FOREIGN
+from host.readers.column_sampling import sampled_name
 from host.sysid.estimators.gust_penetration import ROLL_STATES
-from host.sysid.flight.column_sampling import sampled_name
 from host.sysid.flight.reconstructed_flight import FlownManeuver
 from host.sysid.models.state_space_model import LinearModel
 

@@ -18,14 +18,12 @@ from host.files.regular import file_or_folder
 from host.physical.calibration import Calibration, load_calibration
 from host.physical.recording import Recording
 from host.readers.autopilot_flight import is_autopilot_log
-from host.sysid.flight.autopilot_table import autopilot_table
-from host.sysid.flight.column_map import listed, mapped, missing_lines, read_map
-from host.sysid.flight.column_sampling import Sampling
-from host.sysid.flight.data_finding import Finding
-from host.sysid.flight.derived_columns import derived_columns
-from host.sysid.flight.even_grid import FITTED, LONGEST_GAP_S, USED, even_grid, rows_in_order
-from host.sysid.flight.finding_consequences import checked
-from host.sysid.flight.foreign_tables import (
+from host.readers.autopilot_table import autopilot_table
+from host.readers.column_map import listed, mapped, missing_lines, read_map
+from host.readers.column_sampling import Sampling
+from host.readers.derived_columns import derived_columns
+from host.readers.even_grid import FITTED, LONGEST_GAP_S, USED, even_grid, rows_in_order
+from host.readers.foreign_tables import (
     TEXT_KINDS,
     Foreign,
     from_frame,
@@ -35,10 +33,12 @@ from host.sysid.flight.foreign_tables import (
     refuse_other,
     same_length,
 )
+from host.readers.original_table import is_original, original_table
+from host.readers.recorded import commanded_by_map, recording_of_log, recording_of_table
+from host.sysid.flight.data_finding import Finding
+from host.sysid.flight.finding_consequences import checked
 from host.sysid.flight.logged_inputs import input_columns
 from host.sysid.flight.measured import Measured, measured
-from host.sysid.flight.original_table import is_original, original_table
-from host.sysid.flight.recorded import commanded_by_map, recording_of_log, recording_of_table
 from host.sysid.flight.unit_sign_checks import SURFACES
 from host.terminal import command_line
 

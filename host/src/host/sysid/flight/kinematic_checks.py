@@ -17,7 +17,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
-from host.sysid.flight.column_map import UNITS
+from host.readers.column_map import UNITS
 from host.sysid.flight.data_finding import AS_IT_IS, HINT, Finding
 from host.sysid.flight.driven_motion import (
     DrivenFactor,

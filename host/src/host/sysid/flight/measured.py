@@ -13,7 +13,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.people_units import people_name
-from host.sysid.flight.column_sampling import FEWEST, Sampling, sampling_of
+from host.readers.column_sampling import FEWEST, Sampling, sampling_of
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.maneuver_detection import FLYING_SHARE
 from host.sysid.flight.stuck_sensors import stuck_runs

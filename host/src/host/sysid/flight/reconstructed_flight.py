@@ -20,6 +20,7 @@ from host.instrument.instrument_errors import InstrumentErrors
 from host.instrument.servo_prior import ServoPrior
 from host.near_names import like
 from host.physical.recording import OWN, SURFACES
+from host.readers.column_sampling import sampled_name
 from host.sysid.compatibility.flow_angles import FlowAngles
 from host.sysid.compatibility.position_correction import transfer_to_cg
 from host.sysid.compatibility.reconstruction import Compatibility
@@ -30,7 +31,6 @@ from host.sysid.compatibility.sensor_corrections import (
     pressure_share,
 )
 from host.sysid.compatibility.sensor_dynamics import columns_at_cg
-from host.sysid.flight.column_sampling import sampled_name
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.input_kinks import with_means_of_motion
 from host.sysid.flight.maneuver_detection import DetectedManeuver

@@ -12,7 +12,7 @@ import numpy as np
 
 from host.arrays import Array, BoolArray
 from host.constants import GRAVITY_MPS2
-from host.sysid.flight.column_sampling import runs
+from host.readers.column_sampling import runs
 
 USUALLY, MISSED = 0.95, 1.5  # of the windows as long; times the most that they miss
 STEPS = 3.0  # of a quantised value, that motion must cross

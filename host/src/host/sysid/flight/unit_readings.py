@@ -16,7 +16,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2, RAD_PER_DEG
-from host.sysid.flight.column_map import UNITS
+from host.readers.column_map import UNITS
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.driven_motion import CERTAIN
 from host.sysid.flight.identity_factors import FACTOR_CORRELATION

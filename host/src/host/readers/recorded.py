@@ -21,7 +21,7 @@ from host.physical.recording import FOREIGN, SURFACES, Recording
 
 if TYPE_CHECKING:
     from host.log import FlightLog
-    from host.sysid.flight.column_map import Line
+    from host.readers.column_map import Line
 
 OWN_COLUMN = "mega_drives"  # no table of others has this column
 GPS_COLUMN, GPS_SPAN_S = "v_north_mps", 20.0  # as `physical/timebase` wants it

@@ -12,8 +12,8 @@ import numpy as np
 from host.arrays import Array, BoolArray, IntArray
 from host.errors import IdentificationError
 from host.physical.sampling import GAP_FACTOR, SLOW_US, bend
-from host.sysid.flight.column_sampling import sampled_name
-from host.sysid.flight.foreign_tables import from_frame
+from host.readers.column_sampling import sampled_name
+from host.readers.foreign_tables import from_frame
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,11 +9,11 @@ import pandas as pd
 import pytest
 from host.cli import main
 from host.errors import IdentificationError
+from host.readers.shipped_maps import shipped_maps
 from host.sysid.flight.flight_tables import read_flight_columns
-from host.sysid.flight.shipped_maps import shipped_maps
 from scipy import io
 
-THOR = Path(__file__).parents[3] / "data/thor75/flight75_240_270.csv"
+THOR = Path(__file__).parents[2] / "data/thor75/flight75_240_270.csv"
 FOOT, GRAVITY = 0.3048, 9.80665
 # What the layouts have in common, and is compared.
 NAMES = (

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from host.physical.recording import AUTOPILOT, SURFACES, Recording
 from host.readers.autopilot_flight import CLOCK_SHARE, read_autopilot
-from host.sysid.flight.foreign_tables import Foreign
+from host.readers.foreign_tables import Foreign
 
 
 def autopilot_table(source: Path, sensors: Mapping[str, int] | None) -> Foreign:

@@ -29,7 +29,7 @@ from host.files.quantities import Quantity
 from host.files.user_text import read_toml
 from host.near_names import like
 from host.physical.recording import SURFACES
-from host.sysid.flight.shipped_maps import is_shipped, map_file
+from host.readers.shipped_maps import is_shipped, map_file
 
 DEG, FOOT, POUND_PA = RAD_PER_DEG, 0.3048, 6894.757
 # What a column of ours may come in, by the end of its name.

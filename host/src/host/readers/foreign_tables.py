@@ -15,7 +15,7 @@ from host.errors import IdentificationError
 from host.extras import install_hint
 from host.physical.calibration import Calibration
 from host.physical.recording import Recording
-from host.sysid.flight.text_table import HEAD_BYTES, read_text
+from host.readers.text_table import HEAD_BYTES, read_text
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,7 +12,7 @@ from host.original.row_table import NOTES, make_table
 from host.original.rows import LAYOUTS, looks_like_rows, read_rows
 from host.physical.calibration import load_calibration
 from host.physical.recording import SURFACES, Recording
-from host.sysid.flight.foreign_tables import Foreign
+from host.readers.foreign_tables import Foreign
 
 _HEAD_BYTES = 4096
 
