@@ -1,6 +1,6 @@
 # Two commands: `make demo` and `make test`. Both set up what they need first.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test native mega sitl lint format bench study fleet-bench live-bench flight-bench imu-bench faults power-cuts card-images fuzz mutants hw clean input-flights
+.PHONY: help setup demo test native mega sitl lint format bench study fleet-bench live-bench flight-bench imu-bench faults power-cuts card-images fuzz mutants hw clean input-flights ideas
 PYTHON := .venv/bin/python
 PIO := .venv/bin/pio
 # Runs a module of tests/chip in that folder; what it imports lies elsewhere.
@@ -67,6 +67,9 @@ power-cuts: setup sitl ## power cuts in flight and at every write of metadata, a
 hw: ## check schematic, board and mechanics in KiCad and CAD (asks for an apt source; minutes)
 	@.ci/setup.sh hw
 	@.venv-hw/bin/python -m pytest --noconftest tests/hw/campaign/check_*.py
+
+ideas: setup sitl ## count what a reader must know: files, functions, filters, verdicts and numbers of identification
+	@$(PYTHON) -m tests.ideas $(IDEAS)
 
 mutants: setup ## share of mutants of the deciding files that their unit tests kill (half an hour)
 	@$(PYTHON) -m tests.mutants $(MUTANTS)
