@@ -30,14 +30,14 @@ def times(name: str, factor: float) -> Change:
 
 def drifted(x: pd.DataFrame) -> pd.DataFrame:
     """Airspeed that changes by more than the forward force makes it."""
-    more = 0.8 * 0.02 * np.cumsum(x["ax_mps2"] - x["ax_mps2"].mean())
+    more = 0.8 * 0.04 * np.cumsum(x["ax_mps2"] - x["ax_mps2"].mean())
     return x.assign(airspeed_mps=x["airspeed_mps"] + more - more.mean())
 
 
 def stuck(x: pd.DataFrame) -> pd.DataFrame:
     """An angle of attack that stands still through a maneuver."""
     values = x["alpha_rad"].to_numpy(copy=True)
-    values[:400] = values[0]
+    values[:200] = values[0]
     return x.assign(alpha_rad=values)
 
 
@@ -84,7 +84,7 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
     assert main(["simulate", "calm", *options]) == 0
     table = pd.read_csv(folder / "flight.csv")
     theirs = [name for name in ("t_s", *USED) if name in table]
-    return table.loc[table["t_s"] > 8.0, theirs].reset_index(drop=True)
+    return table.loc[table["t_s"] > 8.0, theirs].iloc[::2].reset_index(drop=True)
 
 
 def identified(path: Path, *options: str) -> dict[str, Any]:
@@ -106,13 +106,13 @@ def test_every_check_is_tried_here() -> None:
 
 @pytest.mark.parametrize("check", OF_COLUMNS)
 def test_an_accepted_column_is_used_as_it_is(check: str, record: pd.DataFrame) -> None:
+    """What is done without it is in `test_unit_sign_checks` and its neighbours."""
     name, change = OF_COLUMNS[check]
     table = change(record)
-    [found, *_] = [f for f in read_flight_columns(table).findings if f.check == check]
-    assert name in found.channels
-    assert found.causes
     kept = read_flight_columns(table, accept=(check,))
     [found, *_] = [f for f in kept.findings if f.check == check]
+    assert name in found.channels
+    assert found.causes
     assert found.done == "accepted, used as it is"
     assert found.accepted
     assert not found.closed

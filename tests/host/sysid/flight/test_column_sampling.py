@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -9,6 +10,7 @@ import pytest
 from host.readers.column_sampling import quantum, sampling_of
 from host.sysid.estimators.filter_error_gust import SLOW_IN_CALM
 from host.sysid.flight.flight_tables import read_flight_columns
+from host.sysid.flight.linear_answer import Answer as LinearAnswer
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.templates import Trim, longitudinal
 from host.sysid.numerics.output_error_problem import OutputProblem
@@ -31,13 +33,13 @@ SERVO_RADPS, FINE = 46.0, 8  # it moves between the samples too
 
 
 def record(seed: int, noise: float = 1.0) -> pd.DataFrame:
-    """Return 40 s of a linear aircraft with two 3-2-1-1s and a doublet, at 50 Hz."""
-    model, dt_s, rows = longitudinal(TRIM), 0.02, 2000
+    """Return 20 s of a linear aircraft with two 3-2-1-1s and a doublet, at 50 Hz."""
+    model, dt_s, rows = longitudinal(TRIM), 0.02, 1000
     t, u = dt_s / FINE * np.arange(rows * FINE), np.zeros(rows * FINE)
-    for start_s in (5.0, 18.0):
+    for start_s in (5.0, 9.5):
         for first_s, last_s, sign in ((0, 0.6, 1), (0.6, 1.0, -1), (1.0, 1.2, 1), (1.2, 1.4, -1)):
             u[(t > start_s + first_s) & (t <= start_s + last_s)] = sign * 3.0 * DEG
-    u[(t > 30.0) & (t <= 30.4)], u[(t > 30.4) & (t <= 30.8)] = 3.0 * DEG, -3.0 * DEG
+    u[(t > 14.0) & (t <= 14.4)], u[(t > 14.4) & (t <= 14.8)] = 3.0 * DEG, -3.0 * DEG
     left = np.exp(-SERVO_RADPS * dt_s / FINE)
     for k in range(1, len(t)):
         u[k] = u[k - 1] + (1.0 - left) * (u[k] - u[k - 1])
@@ -164,58 +166,51 @@ def test_a_sensor_that_must_move_and_does_not_is_stuck(name: str, made: str) -> 
     assert "bridged" not in kept.columns
 
 
-def fitted(table: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
-    """Return estimates and half-widths of the true derivatives."""
-    answer = host.identify(table, models="longitudinal", stretches=[(4.0, 39.0)]).linear[0].result
-    half = answer.half_width()
-    names = [n for n in TRUE if n in answer.names]
-    at = [answer.index(n) for n in names]
-    assert len(names) == len(TRUE)
-    return answer.estimate[at], half[at]
-
-
 SPOILT: dict[str, Callable[[pd.DataFrame], pd.DataFrame]] = {
-    "quantised": quantised,
-    "held": held,
-    "both": lambda t: held(quantised(t)),
+    "no": lambda t: t,
+    "quantised and held": lambda t: held(quantised(t)),
     "all held": lambda t: held(t, tuple(NOISE)),
 }
 
 
-def test_spoilt_columns_give_the_unspoilt_estimates() -> None:
-    """Drawn lines for measurements held 47 to 70 % of the truths, and M_alpha was 17 % off."""
-    truth = np.array(list(TRUE.values()))
-    near: dict[str, list[bool]] = {case: [] for case in SPOILT}
-    true: dict[str, list[bool]] = {case: [] for case in SPOILT}
-    for seed in range(3):
-        whole = record(seed)
-        unspoilt, _ = fitted(whole)
-        for case, spoil in SPOILT.items():
-            estimate, half = fitted(spoil(whole))
-            near[case] += list(np.abs(estimate - unspoilt) <= half)
-            true[case] += list(np.abs(estimate - truth) <= half)
-    assert min(np.mean(x) for x in near.values()) > 0.95, near
-    assert min(np.mean(x) for x in true.values()) > 0.84, true
+@cache
+def identified(spoilt: str) -> LinearAnswer:
+    """Return the default answer to a record whose columns are spoilt."""
+    table = SPOILT[spoilt](record(0))
+    return host.identify(table, models="longitudinal", stretches=[(4.0, 19.5)]).linear[0]
+
+
+@pytest.mark.parametrize("spoilt", ["quantised and held", "all held"])
+def test_spoilt_columns_give_the_unspoilt_estimates(spoilt: str) -> None:
+    """Drawn lines for measurements held half of the truths, and M_alpha was 17 % off.
+
+    How often intervals hold is counted by the study `spoilt_columns`.
+    """
+    whole, found = identified("no").result, identified(spoilt).result
+    half = found.half_width()
+    for name, true in TRUE.items():
+        k = found.index(name)
+        assert abs(found.estimate[k] - whole.value(name)) <= half[k], name
+        assert abs(found.estimate[k] - true) <= 1.5 * half[k], name
 
 
 def test_a_slow_column_leaves_the_gust_filter() -> None:
-    answer = host.identify(held(record(0)), models="longitudinal", stretches=[(4.0, 39.0)])
-    assert answer.linear[0].method == "filter-error-gust"
-    assert answer.linear[0].result.residual_kind == "innovation"
+    answer = identified("quantised and held")
+    assert answer.method == "filter-error-gust"
+    assert answer.result.residual_kind == "innovation"
 
 
 def test_in_calm_air_output_error_tells_delays_by_slow_columns() -> None:
     """By the filter the gyro's delay scattered twice as far as it was known."""
-    slow = SPOILT["all held"](record(0))
-    [answer] = host.identify(slow, models="longitudinal", stretches=[(4.0, 39.0)]).linear
-    assert answer.result.residual_kind == "output"
-    assert SLOW_IN_CALM in answer.result.warnings
-    assert {"delay_vanes_s", "delay_imu_s"} <= set(answer.result.names)
+    result = identified("all held").result
+    assert result.residual_kind == "output"
+    assert SLOW_IN_CALM in result.warnings
+    assert {"delay_vanes_s", "delay_imu_s"} <= set(result.names)
 
 
 def test_without_a_compiler_output_error_stands_in(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("host.sysid.numerics.intermittent_filter.has_compiler", lambda: False)
-    answer = host.identify(held(record(0)), models="longitudinal", stretches=[(4.0, 39.0)])
+    answer = host.identify(held(record(0)), models="longitudinal", stretches=[(4.0, 19.5)])
     assert answer.linear[0].method == "output-error-white"
     assert any("numba" in line for line in answer.linear[0].result.warnings)
 
@@ -228,9 +223,8 @@ def test_intervals_hold_beside_a_clean_column() -> None:
     clean = record(0, noise=0.0)
     true = []
     for names in (("alpha_rad",), ("theta_rad", "airspeed_mps"), ("q_radps",), tuple(NOISE)):
-        for seed in range(2):
-            table = record(seed).assign(**{name: clean[name] for name in names})
-            found = host.identify(table, models=model, stretches=[(0.0, 39.9)]).linear[0].result
-            half = found.half_width()
-            true += [abs(found.value(n) - x) <= half[found.index(n)] for n, x in TRUE.items()]
+        table = record(0).assign(**{name: clean[name] for name in names})
+        found = host.identify(table, models=model, stretches=[(0.0, 19.9)]).linear[0].result
+        half = found.half_width()
+        true += [abs(found.value(n) - x) <= half[found.index(n)] for n, x in TRUE.items()]
     assert np.mean(true) > 0.9
