@@ -131,13 +131,15 @@ fi
 
 # --- compiled kernels ------------------------------------------------------------------------
 
-inputs="$({ find host/src/host/compiled.py host/src/host/aircraft host/src/host/twin host/src/host/sysid -name '*.py' |
+inputs="$({ find host/src/host/compiled.py host/src/host/aircraft host/src/host/twin host/src/host/sysid \
+  host/src/host/thesis -name '*.py' |
   sort | xargs cat
   .venv/bin/pip --version; pwd; } | sha256sum | cut -c1-64)"
 if ! grep -qsx "$inputs" .cache/kernels-done; then
   say "compiling the kernels of virtual flight and identification (half a minute)"
   quietly kernels.log "$python" -m host.twin
   quietly kernels-sysid.log "$python" -m host.sysid
+  quietly kernels-thesis.log "$python" -m host.thesis
   mkdir -p .cache
   printf '%s\n' "$inputs" >.cache/kernels-done
 fi

@@ -14,8 +14,8 @@ from pathlib import Path
 from host.compiled import prefer_machine_code
 from host.errors import ExitCode
 from host.extras import install_hint
-from host.sysid.estimators.hopfield import ITERATIONS
-from host.sysid.estimators.method_registry import METHODS
+from host.sysid.estimators.method_registry import methods as known_methods
+from host.thesis.hopfield import ITERATIONS
 
 from studies import (
     accuracy,
@@ -128,7 +128,7 @@ def study_g(stem: Path, size: int) -> list[Path]:
 
     scores = [
         methods.score(m, data, methods.runs_of(m, METHOD_RUNS[size]))
-        for m in METHODS
+        for m in known_methods()
         for data in methods.DATA
     ]
     return write(tables.methods_table(scores), methods_figure(scores), stem)

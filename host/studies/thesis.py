@@ -14,7 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from host.arrays import Array
-from host.sysid.estimators.hopfield import (
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.state_space_model import free_model
+from host.thesis.error_figures import thesis_program_error_percent
+from host.thesis.hopfield import (
     ITERATIONS,
     LAMBDA,
     RHO,
@@ -23,9 +26,6 @@ from host.sysid.estimators.hopfield import (
     largest_stable_gain,
     network,
 )
-from host.sysid.models.diagnostics import thesis_program_error_percent
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import free_model
 
 from studies.aircraft import INPUTS, STATES, TABLE_31_A, TABLE_31_B
 from studies.inputs import SHAPES

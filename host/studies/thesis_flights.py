@@ -20,14 +20,11 @@ from host.arrays import Array
 from host.errors import IdentificationError
 from host.readers.even_grid import even_columns
 from host.sysid.estimators.equation_error import fit_equation_error
-from host.sysid.estimators.hopfield import SWEEPS, free_run, line_search, network
 from host.sysid.flight.linear_estimator import identify
-from host.sysid.models.diagnostics import (
-    thesis_program_error_percent,
-    thesis_sum_of_mean_errors,
-)
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, free_model
+from host.thesis.error_figures import thesis_program_error_percent, thesis_sum_of_mean_errors
+from host.thesis.hopfield import SWEEPS, free_run, line_search, network
 from host.twin.virtual import VirtualFlight, virtual_flight
 
 FIRST_SEED = 500

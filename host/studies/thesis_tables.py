@@ -16,7 +16,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from host.arrays import Array
-from host.sysid.estimators.hopfield import (
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.state_space_model import LinearModel, free_model
+from host.thesis.error_figures import thesis_program_error_percent
+from host.thesis.hopfield import (
     LAMBDA,
     RECORDED,
     RHO,
@@ -28,9 +31,6 @@ from host.sysid.estimators.hopfield import (
     line_search,
     network,
 )
-from host.sysid.models.diagnostics import thesis_program_error_percent
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel, free_model
 
 from studies.aircraft import INPUTS, STATES, TABLE_31_A
 from studies.inputs import SHAPES

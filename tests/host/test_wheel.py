@@ -87,3 +87,5 @@ def test_wheel_decodes_a_log_outside_the_clone(tmp_path: Path) -> None:
     said = run(scripts / "host", "decode", "flight.bin", cwd=tmp_path)
     assert "losses       none" in said
     assert len((tmp_path / "flight.csv").read_text().splitlines()) == 201
+    said = run(scripts / "host", "identify", "--method", "list", cwd=tmp_path)
+    assert "hopfield-line-search" in said  # plugged in by an entry point

@@ -56,8 +56,8 @@ OURS = re.compile(r"frames\.toml|pin_map|settings\.toml|\.pio\b")
 HOST_FLOORS: dict[str, tuple[str, ...]] = {
     "host": (
         *("files", "wire", "physical", "export", "original", "link", "log", "readers", "decode"),
-        *("aircraft", "instrument", "bench_calibration", "twin", "sysid", "planning"),
-        *("installation", "live", "preflight", "report", "fleet", "verbs"),
+        *("aircraft", "instrument", "bench_calibration", "twin", "sysid", "thesis"),
+        *("planning", "installation", "live", "preflight", "report", "fleet", "verbs"),
     ),
     "host.fleet": ("statistics", "sources", "tasks", "dataset", "pages", "runs"),
     "host.twin": ("faults", "testcard", "flight", "sensors", "ground", "recorder", "outcome"),

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.sysid.estimators.hopfield import LAMBDA, STEP_S, largest_stable_gain, network
-from host.sysid.estimators.method_registry import METHODS
+from host.sysid.estimators.method_registry import methods
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.models.diagnostics import GRADES, NOT_IDENTIFIABLE
 from host.sysid.models.state_space_model import free_model
+from host.thesis.hopfield import LAMBDA, STEP_S, largest_stable_gain, network
 from studies.__main__ import main
 from studies.accuracy import run_case as accuracy
 from studies.aircraft import INPUTS, STATES, TABLE_31_A, TABLE_31_B
@@ -109,7 +109,7 @@ def test_refusal_agrees_with_the_bound_at_the_truth() -> None:
 
 def test_every_method_is_in_the_table_and_the_line_search_shows_its_start() -> None:
     """Started 20 % off it stays there: its figure hardly knows the parameters."""
-    assert {runs_of(method, 60) for method in METHODS} == {60, 10, 5}
+    assert {runs_of(method, 60) for method in methods()} == {60, 10, 5}
     assert runs_of("hopfield-line-search", 12) == 1
     assert runs_of("filter-error", 12) == 2
     found = score("hopfield-line-search", "3-2-1-1, 20 Hz", 1)

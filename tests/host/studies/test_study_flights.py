@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from host.readers.even_grid import even_columns
 from host.sysid.coefficients.coefficient_estimator import identify_coefficients
-from host.sysid.estimators.hopfield import free_run
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import free_model
+from host.thesis.hopfield import free_run
 from host.twin.virtual import VirtualFlight, virtual_flight
 from studies.coefficients import CoefficientTally, true_delays, truths
 from studies.flights import PRINCIPAL

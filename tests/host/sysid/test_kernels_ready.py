@@ -30,11 +30,12 @@ BUILT = """
 import json
 from host.aircraft import propulsion
 from host.compiled import Kernel
-from host.sysid.__main__ import build_kernels
-from host.sysid.estimators import hopfield
+from host.sysid import __main__ as of_sysid
 from host.sysid.numerics import recursion
+from host.thesis import __main__ as of_thesis, hopfield
 recursion.WORTH_COMPILING = propulsion.WORTH_COMPILING = 0.0
-build_kernels()
+of_sysid.build_kernels()
+of_thesis.build_kernels()
 
 def codes():
     found = {}

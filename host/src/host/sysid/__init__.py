@@ -4,6 +4,9 @@ The front door is `fit(method, model, maneuvers)`; a `LinearModel` says what is 
 free, a `Maneuver` holds the samples, a `FitResult` is the answer of every method alike.
 """
 
+from host.sysid.estimators.estimation_method import Method as Method
+from host.sysid.estimators.estimation_method import MethodOption as MethodOption
+from host.sysid.estimators.estimation_method import number as number
 from host.sysid.estimators.method_registry import fit as fit
 from host.sysid.estimators.method_registry import methods as methods
 from host.sysid.models.fit_result import FitResult as FitResult

@@ -15,7 +15,6 @@ import numpy as np
 import host
 from host.aircraft.file import load_measured
 from host.aircraft.propulsion import RotorInputs, rotor_steps
-from host.sysid.estimators.hopfield import iterate, iterate_until
 from host.sysid.numerics.recursion import propagate_block
 
 AIRCRAFT = "ultrastick25e"
@@ -23,9 +22,6 @@ AIRCRAFT = "ultrastick25e"
 
 def build_kernels() -> None:
     """Call every kernel with arguments of the types that methods use; a test holds it to that."""
-    W, b = -np.eye(2), np.ones(2)
-    iterate(W, b, np.zeros(2), 0.1, 200.0, 3, 1e6)
-    iterate_until(W, b, np.zeros(2), 0.1, 200.0, b, 0.5, 3)
     F, S, out = np.eye(2), np.zeros((2, 3)), np.zeros((2, 4, 3))
     propagate_block(F, F, S, S.copy(), np.zeros((4, 6)), 0, 4, out)
     half = np.full(2, 0.5)

@@ -68,7 +68,7 @@ def known_names() -> dict[str, list[str]]:
     from host.aircraft.file import names as aircraft
     from host.readers.shipped_maps import shipped_maps
     from host.sysid.flight.linear_model import AXIS_OF
-    from host.sysid.models.thesis_models import shipped_models
+    from host.sysid.models.named_models import shipped_files
     from host.sysid.pipeline.requested_models import COEFFICIENTS, known_methods
     from host.twin.testcard.cards import names as cards
 
@@ -76,7 +76,7 @@ def known_names() -> dict[str, list[str]]:
         "aircraft": aircraft(),
         "card": cards(),
         "method": [*known_methods(), "list"],
-        "model": [*AXIS_OF, COEFFICIENTS, *shipped_models(), "list"],
+        "model": [*AXIS_OF, COEFFICIENTS, *shipped_files(), "list"],
         "map": [*shipped_maps(), "list"],
     }
 

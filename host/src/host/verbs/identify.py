@@ -51,11 +51,11 @@ def add_parser(subparsers: Any) -> None:
         help="estimator, repeatable for a side-by-side table; 'list' shows them",
     )
     parser.add_argument("--method-option", action="append", metavar="NAME=VALUE",
-                        help="option of hopfield and hopfield-line-search: lambda, rho,"
-                        " iterations, start (least-squares, model, zero); of recursive:"
-                        " forgetting")  # fmt: skip
+                        help="option of a method, which 'list' in place of the method"
+                        " shows")  # fmt: skip
     parser.add_argument("--history", type=Path, metavar="FILE",
-                        help="write the convergence of hopfield or recursive as .csv")  # fmt: skip
+                        help="write how the estimate of an iterative or recursive method"
+                        " settled as .csv")  # fmt: skip
     parser.add_argument("--aircraft", metavar="NAME", help="aircraft file: mass, sizes, sensors;"
                         " gives coefficients")  # fmt: skip
     parser.add_argument("--truth", type=Path, metavar="TOML", action=StorePlaced, default=[],
@@ -170,10 +170,10 @@ def _asked_for(args: argparse.Namespace) -> list[str]:
     """Return what 'list' in place of a name shows; nothing where no list is asked for."""
     from host.readers.shipped_maps import LIST, map_lines
     from host.sysid.flight.data_finding import check_lines
-    from host.sysid.pipeline.requested_models import known_methods, model_lines
+    from host.sysid.pipeline.requested_models import method_lines, model_lines
 
     if LIST in (args.method or ()):
-        return [f"{name:26s} {about}" for name, about in known_methods().items()]
+        return method_lines()
     if LIST in (args.model or ()):
         return model_lines()
     if LIST in [str(path) for _, path in args.map]:

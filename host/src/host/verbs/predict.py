@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     from host.readers.shipped_maps import LIST, map_lines
     from host.sysid.answer.output_files import OutputPaths, check_outputs
     from host.sysid.flight.data_finding import check_lines
-    from host.sysid.models.thesis_models import shipped_lines
+    from host.sysid.models.named_models import shipped_lines
     from host.sysid.pipeline.arguments import option_words
     from host.sysid.pipeline.prediction import predict
 

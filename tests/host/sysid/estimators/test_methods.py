@@ -1,7 +1,5 @@
 """Every method behind one door: truth recovered, peers agreed with, failures in one line."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from host.errors import IdentificationError
@@ -229,20 +227,3 @@ def test_inflation_is_power_times_the_time_a_correlation_lasts() -> None:
     slow = signal.lfilter([1.0], [1.0, -0.8], white, axis=0)
     # Of an AR(1) process: its variance times (1 + a) / (1 - a), which is 1 / (1 - a)^2.
     assert innovation_inflation([slow]) == pytest.approx(25.0, rel=0.15)
-
-
-def test_genetic_search_finds_the_valley_from_far_away() -> None:
-    far = navion_structured().with_start(np.array([0, 0, 0, -1, 0, -1, -1, 0, -1.0]))
-    bounded = dataclasses.replace(
-        far,
-        parameters=tuple(
-            dataclasses.replace(p, lower=-3.0 * abs(t) - 0.01, upper=3.0 * abs(t) + 0.01)
-            for p, t in zip(far.parameters, TRUTH, strict=True)
-        ),
-    )
-    result = fit("genetic", bounded, [noisy(14)], generations=60)
-    reference = fit("output-error", navion_structured(), [noisy(14)])
-    miss = np.abs(result.estimate - reference.estimate) / reference.standard_error
-    assert np.max(miss) < 0.05
-    search = np.asarray(result.details["search_best"])
-    assert search[6] == pytest.approx(TRUTH[6], rel=0.5)

@@ -20,8 +20,6 @@ from host.sysid.models.diagnostics import (
     identifiability_flags,
     reference_values,
     signal_fits,
-    thesis_program_error_percent,
-    thesis_sum_of_mean_errors,
     whiteness,
 )
 from host.sysid.models.modal_analysis import modes, modes_of
@@ -54,14 +52,6 @@ def test_whiteness_tells_white_from_coloured() -> None:
     outside, p_value = whiteness([coloured])
     assert p_value < 1e-6
     assert outside > 0.04
-
-
-def test_thesis_figures_show_what_the_second_division_hides() -> None:
-    measured = np.column_stack([np.full(77, 2.0), np.full(77, -4.0)])
-    simulated = measured * 0.72
-    honest = 2 * 28.0
-    assert thesis_program_error_percent(measured, simulated) == pytest.approx(honest / 77)
-    assert thesis_sum_of_mean_errors(measured, simulated) == pytest.approx(0.28 * 6.0)
 
 
 def test_navion_is_answered_and_the_thesis_example_is_refused() -> None:

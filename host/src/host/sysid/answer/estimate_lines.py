@@ -12,7 +12,7 @@ from host.constants import DEG_PER_RAD
 from host.sysid.answer.constant_lines import constant_lines
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.servo_lines import servo_estimate_lines
-from host.sysid.answer.settling_history import settling_lines
+from host.sysid.answer.settling_history import history_lines
 from host.sysid.answer.trust_rules import unpredicted_states
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import from_zero
@@ -56,7 +56,7 @@ def model_lines(answer: Answer) -> list[str]:
             + ("" if from_zero(c) else "  not told from zero")
             for c in answer.coefficients
         ]
-    lines += [*constant_lines(answer), *settling_lines(answer), *mode_lines(answer)]
+    lines += [*constant_lines(answer), *history_lines(answer), *mode_lines(answer)]
     for kind, fits in (
         ("free simulation, fitted data", answer.fits),
         ("free simulation, held-out data", answer.validation),

@@ -16,19 +16,13 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import special
 
+from host.sysid.estimators.method_registry import find_method
 from host.sysid.flight.linear_answer import Answer
 
 SIGNIFICANCE = 0.01
 LEAST_SHARE = 0.1
-# Consistent in the noise of that name; white output error is nearly so in gusts too, open loop.
-VALID = {
-    "white": (
-        "output-error", "output-error-white", "frequency-output-error", "filter-error",
-        "filter-error-gust", "genetic", "extended-kalman", "unscented-kalman",
-    ),
-    "coloured": ("output-error", "output-error-white"),
-    "gust": ("filter-error", "filter-error-gust", "output-error-white"),
-}  # fmt: skip
+# What methods of `fit` are valid in, each says itself; that of the pipeline's own:
+VALID = {"filter-error-gust": ("white", "gust")}
 
 
 def noise_found(answers: Sequence[Answer]) -> str:
@@ -61,9 +55,9 @@ def disagreements(answer: Answer, beside: Sequence[Answer]) -> dict[str, str]:
     """
     same = [a for a in beside if a.template == answer.template and a.result.converged]
     same = [a for a in same if a.model.name == answer.model.name]
-    valid = VALID[noise_found([*same, answer])]
+    noise = noise_found([*same, answer])
     others = [a for a in same if a is not answer and a.method != answer.method]
-    judges = [a for a in others if _kind(a) in valid]
+    judges = [a for a in others if noise in _valid_in(_kind(a))]
     found: dict[str, str] = {}
     for other in judges:
         for name in answer.model.parameter_names:
@@ -80,6 +74,11 @@ def _kind(answer: Answer) -> str:
         "output error (white)": "output-error-white",
         "output error": "output-error",
     }.get(answer.result.method, answer.method)
+
+
+def _valid_in(method: str) -> tuple[str, ...]:
+    by = None if method in VALID else find_method(method)
+    return by.valid_in if by else VALID.get(method, ())
 
 
 def _differ(one: Answer, other: Answer, name: str) -> bool:

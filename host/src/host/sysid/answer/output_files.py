@@ -16,7 +16,7 @@ from host.sysid.answer.atomic_files import atomic_write, check_destination, file
 from host.sysid.answer.mat_file import labels, write_mat
 from host.sysid.answer.settling_history import has_history, write_history
 from host.sysid.answer.simulators.forms import CONTROL, FORMS, files_of, form_of, write_form
-from host.sysid.estimators.method_options import SETTLING
+from host.sysid.estimators.method_registry import all_methods
 from host.sysid.flight.linear_answer import Answer
 
 if TYPE_CHECKING:
@@ -61,14 +61,14 @@ class OutputPaths:
         return {name: path for name, path in asked.items() if path is not None}
 
 
-def check_outputs(places: OutputPaths, methods: Sequence[str] = SETTLING) -> None:
+def check_outputs(places: OutputPaths, methods: Sequence[str] | None = None) -> None:
     """Refuse what cannot be written while it costs nothing: before the flight is read.
 
     Parameters
     ----------
     places : OutputPaths
-    methods : sequence of str
-        That are asked for.
+    methods : sequence of str, optional
+        That are asked for; without them a history may come of any.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def check_outputs(places: OutputPaths, methods: Sequence[str] = SETTLING) -> Non
         source, an aircraft without what it is made of, a history by methods that note none,
         pictures without matplotlib.
     """
-    if places.history is not None and not {*SETTLING} & {*methods}:
+    if places.history is not None and methods is not None and not {*_settling()} & {*methods}:
         raise _no_history(places.history)
     taken: dict[Path, str] = {}
     for name, path in places.files.items():
@@ -232,7 +232,12 @@ def _named(
     return named
 
 
+def _settling() -> list[str]:
+    """Return the methods that note how an estimate settles."""
+    return [name for name, by in all_methods().items() if by.history]
+
+
 def _no_history(path: Path) -> IdentificationError:
     return IdentificationError(
-        f"argument history {path}: no method here notes how it settles; {', '.join(SETTLING)} do"
+        f"argument history {path}: no method here notes how it settles; {', '.join(_settling())} do"
     )

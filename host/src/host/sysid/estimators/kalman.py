@@ -1,8 +1,8 @@
-"""Joint estimation of states and parameters by Kalman filters, extended and unscented."""
+"""Joint estimation of states and parameters by Kalman filters: the extended one."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,14 +19,25 @@ from host.sysid.numerics.output_error_problem import check_shapes
 PASSES = 2  # over the record: the second starts from the parameters of the first
 INITIAL_RELATIVE_SD = 0.5  # first standard deviation of a parameter, relative to its size
 PROCESS_SHARE = 1e-4  # default process noise per root second, of the rms of a state
-SIGMA_POINT_SPREAD = 1e-1  # alpha of the sigma points
 NEGLIGIBLE_CORRELATION = 0.05  # twice the deviation of a correlation over 1600 samples
 REPORTED_INFLATION = 2.0  # from here on there is a warning
 
 
 @dataclass(slots=True)
-class _Filter:
-    """What both filters share: model, noise, layout of the augmented state."""
+class JointFilter:
+    """What the filters share: model, noise, layout of the augmented state.
+
+    Attributes
+    ----------
+    model : LinearModel
+    R : Array, shape (p, p)
+        Covariance of the outputs' noise.
+    process : Array, shape (n,)
+        Process noise of each state, per root second.
+    names : tuple of str
+        Parameters and biases.
+    n_states : int
+    """
 
     model: LinearModel
     R: Array
@@ -40,6 +51,9 @@ class _Filter:
         return joint[..., :n], joint[..., n : n + q], joint[..., n + q :]
 
 
+FilterPass = Callable[[JointFilter, Maneuver, Array, Array], tuple[Array, Array, Array, Array]]
+
+
 def fit_extended(
     model: LinearModel,
     maneuvers: Sequence[Maneuver],
@@ -48,40 +62,15 @@ def fit_extended(
     noise: Array | None = None,
     start: Array | None = None,
 ) -> FitResult:
-    """Fit by an extended Kalman filter; see `fit_unscented` for the parameters.
+    """Fit by an extended Kalman filter; see `fit_jointly` for the parameters.
 
     The state is augmented by the parameters as constants; the filter is linearised with the exact
     derivatives of the discretised model (Jategaonkar, Flight Vehicle System Identification, 2nd
     ed., ch. 7).
     """
-    return _run(model, maneuvers, process, noise, start, unscented=False)
-
-
-def fit_unscented(
-    model: LinearModel,
-    maneuvers: Sequence[Maneuver],
-    *,
-    process: Array | None = None,
-    noise: Array | None = None,
-    start: Array | None = None,
-) -> FitResult:
-    """Fit by an unscented Kalman filter.
-
-    The state is augmented by the parameters as constants; sigma points are propagated by one
-    Runge-Kutta step per sample (Julier & Uhlmann, Proceedings of the IEEE 92, 2004).
-
-    Parameters
-    ----------
-    model, maneuvers
-        Model and data; maneuvers are filtered one after another.
-    process : Array, optional
-        Process noise of each state, per root second, shape (n,).
-    noise : Array, optional
-        Standard deviation of each output, shape (p,); by default from third differences.
-    start : Array, optional
-        Common parameters; by default the mean of a prior, else from equation error.
-    """
-    return _run(model, maneuvers, process, noise, start, unscented=True)
+    return fit_jointly(
+        "extended Kalman filter", _extended_pass, model, maneuvers, process, noise, start
+    )
 
 
 def noise_deviation(maneuvers: Sequence[Maneuver]) -> Array:
@@ -147,15 +136,38 @@ def inflation_lines(excess: float) -> tuple[str, ...]:
     )
 
 
-def _run(
+def fit_jointly(
+    name: str,
+    filter_pass: FilterPass,
     model: LinearModel,
     maneuvers: Sequence[Maneuver],
     process: Array | None,
     noise: Array | None,
     start: Array | None,
-    *,
-    unscented: bool,
 ) -> FitResult:
+    """Fit states and parameters together by passes of a filter over the maneuvers.
+
+    Parameters
+    ----------
+    name : str
+        Of the filter.
+    filter_pass : callable
+        Filters one maneuver: given the filter, the maneuver, joint state and covariance it returns
+        both behind the last sample, and the innovations, in units and whitened, (samples, p).
+    model, maneuvers
+        Model and data; maneuvers are filtered one after another.
+    process : Array, optional
+        Process noise of each state, per root second, shape (n,).
+    noise : Array, optional
+        Standard deviation of each output, shape (p,); by default from third differences.
+    start : Array, optional
+        Common parameters; by default the mean of a prior, else from equation error.
+
+    Raises
+    ------
+    IdentificationError
+        If the model has delays or levers, or the filter diverges.
+    """
     if model.delays or model.accelerometer_offsets:
         raise IdentificationError(
             "Kalman filters have no delays or levers: estimate those by output error"
@@ -174,7 +186,7 @@ def _run(
     locals_ = [f"bias_rate.{s}" for s in model.state_biases]
     locals_ += [f"bias.{y}" for y in model.output_biases]
     names = (*(p.name for p in model.parameters), *locals_)
-    filter_ = _Filter(model, np.diag(deviation**2), intensity, names, n)
+    filter_ = JointFilter(model, np.diag(deviation**2), intensity, names, n)
     first = start_values_of(model, maneuvers)[:q] if start is None else np.array(start)
     size = n + len(names)
     joint: Array = np.zeros(size)
@@ -204,8 +216,7 @@ def _run(
                 joint[k] = 0.0
                 P[k, :] = P[:, k] = 0.0
                 P[k, k] = _bias_variance(model, maneuver, k - n - q)
-            step = _unscented_pass if unscented else _extended_pass
-            joint, P, e, whitened = step(filter_, maneuver, joint, P)
+            joint, P, e, whitened = filter_pass(filter_, maneuver, joint, P)
             if not np.isfinite(joint).all():
                 raise IdentificationError(
                     f"{maneuver.name}: the Kalman filter diverged; give better start values"
@@ -213,7 +224,7 @@ def _run(
             residuals.append(e)
             white.append(whitened)
     return filter_result(
-        "unscented Kalman filter" if unscented else "extended Kalman filter",
+        name,
         (model, names, joint[n:] + change_by_priors(model, P[n:, n : n + q], began), P[n:, n:]),
         maneuvers,
         (residuals, white),
@@ -275,7 +286,7 @@ def _bias_variance(model: LinearModel, maneuver: Maneuver, k: int) -> float:
 
 
 def _extended_pass(
-    filter_: _Filter, maneuver: Maneuver, joint: Array, P: Array
+    filter_: JointFilter, maneuver: Maneuver, joint: Array, P: Array
 ) -> tuple[Array, Array, Array, Array]:
     model, n = filter_.model, filter_.n_states
     m, q = len(model.inputs), len(model.parameters)
@@ -332,103 +343,3 @@ def _extended_pass(
         P = F @ P @ F.T + Q
         P = 0.5 * (P + P.T)
     return joint, P, e, white
-
-
-def _unscented_pass(
-    filter_: _Filter, maneuver: Maneuver, joint: Array, P: Array
-) -> tuple[Array, Array, Array, Array]:
-    model, n, size = filter_.model, filter_.n_states, len(joint)
-    Q = np.zeros_like(P)
-    Q[:n, :n] = np.diag(filter_.process**2) * maneuver.dt_s
-    scale = SIGMA_POINT_SPREAD**2 * size
-    mean_weight = np.full(2 * size + 1, 0.5 / scale)
-    mean_weight[0] = 1.0 - size / scale
-    weight = mean_weight.copy()
-    weight[0] += 3.0 - SIGMA_POINT_SPREAD**2
-    e, white = np.zeros_like(maneuver.outputs), np.zeros_like(maneuver.outputs)
-    next_inputs = np.vstack([maneuver.inputs[1:], maneuver.inputs[-1:]])
-    if model.hold == "zoh":
-        next_inputs = maneuver.inputs
-    for k in range(maneuver.samples):
-        points = _sigma_points(joint, P, scale)
-        y = _outputs(filter_, points, maneuver.inputs[k])
-        mean = mean_weight @ y
-        dy, dx = y - mean, points - joint
-        S = (weight[:, None] * dy).T @ dy + filter_.R
-        K = np.linalg.solve(S, (weight[:, None] * dy).T @ dx).T
-        e[k] = maneuver.outputs[k] - mean
-        white[k] = np.linalg.solve(np.linalg.cholesky(S), e[k])
-        joint = joint + K @ e[k]
-        P = P - K @ S @ K.T
-        P = 0.5 * (P + P.T)
-        points = _sigma_points(joint, P, scale)
-        propagated = _advance(filter_, points, maneuver.inputs[k], next_inputs[k], maneuver.dt_s)
-        joint = mean_weight @ propagated
-        d = propagated - joint
-        P = (weight[:, None] * d).T @ d + Q
-        P = 0.5 * (P + P.T)
-    return joint, P, e, white
-
-
-def _sigma_points(joint: Array, P: Array, scale: float) -> Array:
-    size = np.sqrt(np.maximum(np.diag(P), 1e-300))
-    scaled = P / np.outer(size, size)
-    ridge = 0.0
-    while True:
-        try:
-            root = np.linalg.cholesky(scaled + ridge * np.eye(len(joint)))
-            break
-        except np.linalg.LinAlgError:
-            ridge = max(10.0 * ridge, 1e-12)
-            if ridge > 1.0:
-                raise IdentificationError(
-                    "the unscented filter lost its covariance; give better start values"
-                ) from None
-    spread = np.sqrt(scale) * (size[:, None] * root).T
-    return np.vstack([joint, joint + spread, joint - spread])
-
-
-def _systems(filter_: _Filter, theta: Array, pair: str) -> Array:
-    """Return [A B] or [C D] of every sigma point, (points, rows, columns)."""
-    model = filter_.model
-    base = np.hstack([getattr(model, pair[0]), getattr(model, pair[1])])
-    result = np.repeat(base[None], len(theta), axis=0)
-    entries = model.entries(pair)
-    for t in range(len(entries.row)):
-        result[:, entries.row[t], entries.column[t]] += (
-            entries.gain[t] * theta[:, entries.parameter[t]]
-        )
-    return result
-
-
-def _outputs(filter_: _Filter, points: Array, u: Array) -> Array:
-    x, theta, biases = filter_.split(points)
-    model = filter_.model
-    wide = np.hstack([x, np.repeat(u[None], len(x), axis=0)])
-    y = np.einsum("sij,sj->si", _systems(filter_, theta, "CD"), wide)
-    rates = len(model.state_biases)
-    for b, output in enumerate(model.output_biases):
-        y[:, model.outputs.index(output)] += biases[:, rates + b]
-    return np.asarray(y)
-
-
-def _advance(filter_: _Filter, points: Array, u0: Array, u1: Array, dt_s: float) -> Array:
-    x, theta, biases = filter_.split(points)
-    model = filter_.model
-    systems = _systems(filter_, theta, "AB")
-    constant = np.zeros_like(x)
-    for b, state in enumerate(model.state_biases):
-        constant[:, model.states.index(state)] = biases[:, b]
-
-    def rate(value: Array, u: Array) -> Array:
-        wide = np.hstack([value, np.repeat(u[None], len(value), axis=0)])
-        return np.asarray(np.einsum("sij,sj->si", systems, wide) + constant)
-
-    middle = 0.5 * (u0 + u1)
-    k1 = rate(x, u0)
-    k2 = rate(x + 0.5 * dt_s * k1, middle)
-    k3 = rate(x + 0.5 * dt_s * k2, middle)
-    k4 = rate(x + dt_s * k3, u1)
-    propagated = points.copy()
-    propagated[:, : x.shape[1]] = x + dt_s / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-    return propagated

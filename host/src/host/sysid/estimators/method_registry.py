@@ -1,114 +1,150 @@
 """Registry of the estimation methods: `fit(method, model, maneuvers)`.
 
-A method is imported when it is first used.
+A method is imported when it is first used. Installed packages plug in theirs by entry point; they
+are looked for when methods are listed, or one is named that is not of this room.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from importlib import import_module
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from host.errors import IdentificationError
+from host.files.quantities import Quantity
+from host.plugins import Plug, plugged_in
+from host.sysid.estimators.estimation_method import Method, MethodOption, loaded, number
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.output_error_problem import check_shapes
 
-KNOWN_NOISE = ("output-error", "output-error-white")
-OWN_STARTS = ("extended-kalman", "unscented-kalman")
+GROUP = "host.identification_methods"
 NO_MOTION = 1e-30  # in any unit: an output that moves less holds nothing, and its square underflows
 
-
-@dataclass(frozen=True, slots=True)
-class Method:
-    """Module and function of a method.
-
-    `options` are the settings with which the function is this method.
-    """
-
-    module: str
-    function: str
-    about: str
-    options: tuple[tuple[str, object], ...] = ()
-
+_HERE = "host.sysid.estimators"
+_EQUATION_ERROR = f"{_HERE}.equation_error:fit_equation_error"
+_OUTPUT_ERROR = f"{_HERE}.output_error_fit:fit_output_error"
+_SETTLING = f"{_HERE}.settling:settling_lines"
+_FORGETTING = Quantity("", 0.0, 1.0, "weight of the past per sample", above=True)
 
 METHODS: dict[str, Method] = {
-    "equation-error": Method("equation_error", "fit_equation_error", "ordinary least squares"),
+    "equation-error": Method(function=_EQUATION_ERROR, about="ordinary least squares"),
     "equation-error-weighted": Method(
-        "equation_error",
-        "fit_equation_error",
-        "least squares, equations weighted by their residuals",
-        (("variant", "weighted"),),
+        function=_EQUATION_ERROR,
+        about="least squares, equations weighted by their residuals",
+        settings={"variant": "weighted"},
     ),
     "equation-error-robust": Method(
-        "equation_error", "fit_equation_error", "Huber M-estimate", (("variant", "robust"),)
+        function=_EQUATION_ERROR, about="Huber M-estimate", settings={"variant": "robust"}
     ),
     "equation-error-total": Method(
-        "equation_error", "fit_equation_error", "total least squares", (("variant", "total"),)
+        function=_EQUATION_ERROR,
+        about="total least squares",
+        settings={"variant": "total"},
+        ties=False,
     ),
     "output-error": Method(
-        "output_error_fit",
-        "fit_output_error",
-        "maximum likelihood, memory of the noise estimated",
+        function=_OUTPUT_ERROR,
+        about="maximum likelihood, memory of the noise estimated",
+        equations=_OUTPUT_ERROR,
+        valid_in=("white", "coloured"),
+        holds_noise=True,
+        estimates_delays=True,
     ),
     "output-error-white": Method(
-        "output_error_fit",
-        "fit_output_error",
-        "maximum likelihood for white noise, covariance corrected for colour",
-        (("coloured_noise", False),),
+        function=_OUTPUT_ERROR,
+        about="maximum likelihood for white noise, covariance corrected for colour",
+        settings={"coloured_noise": False},
+        equations=_OUTPUT_ERROR,
+        valid_in=("white", "coloured", "gust"),  # in gusts nearly consistent, open loop
+        holds_noise=True,
+        estimates_delays=True,
     ),
     "filter-error": Method(
-        "filter_error", "fit_filter_error", "maximum likelihood with process noise"
+        function=f"{_HERE}.filter_error:fit_filter_error",
+        about="maximum likelihood with process noise",
+        equations=f"{_HERE}.filter_error_equations:fit_equation_filter_error",
+        valid_in=("white", "gust"),
     ),
     "frequency-equation-error": Method(
-        "frequency_domain", "fit_frequency_equation_error", "least squares on chirp-z transforms"
+        function=f"{_HERE}.frequency_domain:fit_frequency_equation_error",
+        about="least squares on chirp-z transforms",
     ),
     "frequency-output-error": Method(
-        "frequency_domain", "fit_frequency_output_error", "maximum likelihood on chirp-z transforms"
+        function=f"{_HERE}.frequency_domain:fit_frequency_output_error",
+        about="maximum likelihood on chirp-z transforms",
+        valid_in=("white",),
     ),
-    "stepwise": Method("stepwise", "fit_stepwise", "terms chosen by partial F"),
+    "stepwise": Method(
+        function=f"{_HERE}.stepwise:fit_stepwise", about="terms chosen by partial F"
+    ),
     "recursive": Method(
-        "recursive", "fit_recursive_least_squares", "recursive least squares, real time"
+        function=f"{_HERE}.recursive:fit_recursive_least_squares",
+        about="recursive least squares, real time",
+        options=(MethodOption("forgetting", number(_FORGETTING)),),
+        history=_SETTLING,
+        ties=False,
     ),
     "recursive-fourier": Method(
-        "recursive", "fit_recursive_fourier", "regression on running transforms, real time"
+        function=f"{_HERE}.recursive:fit_recursive_fourier",
+        about="regression on running transforms, real time",
+        history=_SETTLING,
     ),
-    "extended-kalman": Method("kalman", "fit_extended", "joint states and parameters"),
-    "unscented-kalman": Method(
-        "kalman", "fit_unscented", "joint states and parameters, sigma points"
-    ),
-    "genetic": Method("genetic", "fit_genetic", "differential evolution, polished"),
-    "neural-delta": Method("neural_delta", "fit_neural", "derivatives of a trained network"),
-    "hopfield": Method("hopfield", "fit_hopfield", "the printed network iteration"),
-    "hopfield-line-search": Method(
-        "hopfield", "fit_hopfield", "the original program", (("variant", "line-search"),)
-    ),
-    "hopfield-whitened": Method(
-        "hopfield", "fit_hopfield", "the network, preconditioned", (("variant", "whitened"),)
+    "extended-kalman": Method(
+        function=f"{_HERE}.kalman:fit_extended",
+        about="joint states and parameters",
+        equations=f"{_HERE}.kalman_equations:fit_extended_equations",
+        valid_in=("white",),
+        holds_starts=False,
     ),
 }
 
-# Of a user's equations; output error takes both kinds of model.
-OF_EQUATIONS: dict[str, Method] = {
-    "output-error": METHODS["output-error"],
-    "output-error-white": METHODS["output-error-white"],
-    "filter-error": Method(
-        "filter_error_equations", "fit_equation_filter_error", "maximum likelihood, process noise"
-    ),
-    "extended-kalman": Method(
-        "kalman_equations", "fit_extended_equations", "joint states and parameters"
-    ),
-}
+
+def find_method(name: str) -> Method | None:
+    """Return a method by its name; None if there is none.
+
+    Raises
+    ------
+    IdentificationError
+        If a package plugs it in that cannot be used.
+    """
+    if name in METHODS:
+        return METHODS[name]
+    plug = plugged_in(GROUP).get(name)
+    return _plugged(plug) if plug else None
+
+
+def _plugged(plug: Plug) -> Method:
+    found = plug.load(IdentificationError)
+    if not isinstance(found, Method):
+        raise IdentificationError(
+            f"{plug.name}: {plug.place} is of type {type(found).__name__}, expected a"
+            " host.sysid.Method"
+        )
+    return found
+
+
+def all_methods() -> dict[str, Method]:
+    """Return every method that can be used, by name; a name of this room stays this room's."""
+    return {name: by for name, by in _each().items() if isinstance(by, Method)}
 
 
 def methods() -> dict[str, str]:
-    """Return the known methods and what each is in a few words."""
-    return {name: method.about for name, method in METHODS.items()}
+    """Return the known methods and what each is in a few words, or why it cannot be used."""
+    return {n: by.about if isinstance(by, Method) else str(by) for n, by in _each().items()}
+
+
+def _each() -> dict[str, Method | IdentificationError]:
+    found: dict[str, Method | IdentificationError] = dict(METHODS)
+    for name, plug in plugged_in(GROUP).items():
+        if name not in METHODS:
+            try:
+                found[name] = _plugged(plug)
+            except IdentificationError as error:
+                found[name] = error
+    return found
 
 
 def fit(
@@ -143,25 +179,26 @@ def fit(
     >>> from host.sysid import fit
     >>> result = fit("output-error", model, [maneuver])  # doctest: +SKIP
     """
-    if method not in METHODS:
-        raise IdentificationError(f"unknown method '{method}'; known: {', '.join(METHODS)}")
+    by = find_method(method)
+    if by is None:
+        raise IdentificationError(f"unknown method '{method}'; known: {', '.join(methods())}")
     if not maneuvers:
         raise IdentificationError("no maneuver to fit: give at least one")
-    known = OF_EQUATIONS if isinstance(model, NonlinearModel) else METHODS
-    entry = known.get(method, METHODS[method])
-    function: Callable[..., Any] = getattr(
-        import_module(f"host.sysid.estimators.{entry.module}"), entry.function
-    )
-    _check(method, model, maneuvers)
+    _check(method, by, model, maneuvers)
+    place = by.equations if isinstance(model, NonlinearModel) and by.equations else by.function
     try:
         # Every number of the result is checked below; during the search trials may overflow.
         with np.errstate(all="ignore"):
-            result: FitResult = function(model, maneuvers, **{**dict(entry.options), **options})
+            result = loaded(place)(model, maneuvers, **{**by.settings, **options})
     except (np.linalg.LinAlgError, ZeroDivisionError) as error:
         raise IdentificationError(
             f"{method}: the equations are singular ({str(error).lower().rstrip('.')}); these data"
             f" do not determine {model.name}"
         ) from error
+    if not isinstance(result, FitResult):
+        raise IdentificationError(
+            f"{method} returned a {type(result).__name__}, expected a host.sysid.FitResult"
+        )
     refuse_unless_finite(result, method)
     return result
 
@@ -182,19 +219,20 @@ def refuse_unless_finite(result: FitResult, method: str) -> None:
             )
 
 
-def _check(method: str, model: LinearModel, maneuvers: Sequence[Maneuver]) -> None:
+def _check(method: str, by: Method, model: LinearModel, maneuvers: Sequence[Maneuver]) -> None:
     """Raise if no method can fit: columns that do not fit the model, outputs that never move."""
     own = isinstance(model, NonlinearModel) and model.own_parameters
     if not (model.parameter_names or own):
         raise IdentificationError(f"model {model.name} has no free parameter: nothing to fit")
-    if isinstance(model, NonlinearModel) and method not in OF_EQUATIONS:
+    if isinstance(model, NonlinearModel) and by.equations is None:
+        able = ", ".join(name for name, other in METHODS.items() if other.equations)
         raise IdentificationError(
-            f"{method} takes linear models; {model.name} has equations, which"
-            f" {', '.join(OF_EQUATIONS)} take"
+            f"{method} takes linear models; {model.name} has equations, which {able} take"
         )
-    if model.known_noise and method not in KNOWN_NOISE:
-        raise IdentificationError(f"{method} cannot hold known noise; {', '.join(KNOWN_NOISE)} can")
-    if (model.known_starts or model.shared_starts) and method in OWN_STARTS:
+    if model.known_noise and not by.holds_noise:
+        able = ", ".join(name for name, other in METHODS.items() if other.holds_noise)
+        raise IdentificationError(f"{method} cannot hold known noise; {able} can")
+    if (model.known_starts or model.shared_starts) and not by.holds_starts:
         raise IdentificationError(
             f"{method} starts from the first samples and cannot hold known or shared initial"
             " states; output-error and filter-error can"

@@ -11,6 +11,7 @@ from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, deviations, unknown_sensors
 from host.physical.recording import OWN
 from host.sysid.compatibility.path_preparation import NO_OFFSETS
+from host.sysid.estimators.method_registry import find_method
 from host.sysid.estimators.start_values import regression_estimates
 from host.sysid.flight.filter_step import (
     feels_roll,
@@ -56,8 +57,6 @@ NO_AIRSPEED = (
 DOUBTFUL = {"ay_mps2"}
 SIDE_FORCE_DOUBTED = "ay_mps2 has an open finding, and is left out of the fit"
 STILL_RAD = 1e-9  # a surface that moves less stands still but for rounding
-# One equation at a time: accelerations repeat the entries of others, and are left out.
-UNTIED = ("equation-error-total", "recursive", "neural-delta")
 STAGED = {
     "flight": "gust filter where alpha is a measured state; beta too, of our log only with an"
     " aircraft file, of dutch-roll where the data show gusts (default)",
@@ -164,7 +163,7 @@ def template_at(
     found = template(
         name,
         trim,
-        accelerometers=method not in UNTIED and trim.known and across in columns,
+        accelerometers=_ties(method) and trim.known and across in columns,
         delays=tuple(delays) if able else (),
         imu_sd_m=imu_place_m(unknown_sensors()) if able else 0.0,
     )
@@ -208,7 +207,14 @@ def fitted_template(
 
 def frees_places(method: str) -> bool:
     """Return whether a method can estimate delays and places of accelerometers."""
-    return method.startswith("output-error") or method in STAGED
+    by = None if method in STAGED else find_method(method)
+    return by.estimates_delays if by else method in STAGED
+
+
+def _ties(method: str) -> bool:
+    """Return whether a method takes accelerations, which repeat the entries of other equations."""
+    by = None if method in STAGED else find_method(method)
+    return by is None or by.ties
 
 
 def imu_place_m(i: SensorErrorModel) -> float:

@@ -1,7 +1,4 @@
-"""Diagnostics of a fit: figures of fit, whiteness, identifiability, collinearity.
-
-The thesis's two error figures are kept under names of their own.
-"""
+"""Diagnostics of a fit: figures of fit, whiteness, identifiability, collinearity."""
 
 from __future__ import annotations
 
@@ -406,18 +403,3 @@ def constant_inputs(model: LinearModel, maneuvers: Sequence[Maneuver]) -> tuple[
         if name != CONSTANT and all(float(np.ptp(m.inputs[:, k])) == 0.0 for m in maneuvers):
             constant.append(name)
     return tuple(constant)
-
-
-def thesis_sum_of_mean_errors(measured: Array, simulated: Array) -> float:
-    """Return the thesis's equation 5.3: sum over states of mean |error|, units mixed."""
-    return float(np.sum(np.mean(np.abs(measured - simulated), axis=0)))
-
-
-def thesis_program_error_percent(measured: Array, simulated: Array) -> float:
-    """Return the figure that the thesis's program prints, in percent.
-
-    It is the relative L1 error divided once more by the number of samples. Times that number it is
-    the sum over states of the relative errors.
-    """
-    shares = np.sum(np.abs(measured - simulated), axis=0) / np.sum(np.abs(measured), axis=0)
-    return float(np.sum(shares) * 100.0 / len(measured))

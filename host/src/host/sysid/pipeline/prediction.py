@@ -16,8 +16,8 @@ from host.sysid.answer.json_document import json_text
 from host.sysid.flight.free_simulation import frozen_at
 from host.sysid.models.equation_file import KIND as EQUATIONS
 from host.sysid.models.model_file import read_model
+from host.sysid.models.named_models import model_path
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
-from host.sysid.models.thesis_models import model_path
 from host.sysid.models.thrust_column import (
     THRUST,
     THRUST_COLUMNS,

@@ -14,11 +14,12 @@ from host.sysid.coefficients.coefficient_model import (
     read_coefficient_model,
     standard_model,
 )
+from host.sysid.estimators.method_registry import all_methods, find_method
 from host.sysid.estimators.method_registry import methods as single_methods
 from host.sysid.flight.linear_model import AXIS_OF, DEFAULT_METHOD, STAGED
 from host.sysid.models.model_file import read_model
+from host.sysid.models.named_models import model_path, shipped_files, shipped_lines
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
-from host.sysid.models.thesis_models import model_path, shipped_lines, shipped_models
 from host.sysid.models.thrust_column import THRUST_COLUMNS
 from host.sysid.pipeline.arguments import listed
 
@@ -100,13 +101,13 @@ def requested_models(given: ModelName | Iterable[ModelName] | None) -> Models:
             terms.append(Path(name))
         elif name in AXIS_OF:
             linear.append((str(name), None))
-        elif str(name) in shipped_models() and not Path(name).exists():
-            linear.append((str(name), read_model(model_path(name))))
         elif (str(name) and Path(name).exists()) or str(name).lower().endswith(".toml"):
             linear.append((str(name), read_model(Path(name))))
+        elif str(name) in shipped_files():
+            linear.append((str(name), read_model(model_path(name))))
         else:
             raise IdentificationError(
-                f"no model '{name}'{like(str(name), (*AXIS_OF, COEFFICIENTS, *shipped_models()))};"
+                f"no model '{name}'{like(str(name), (*AXIS_OF, COEFFICIENTS, *shipped_files()))};"
                 f" there are {', '.join(AXIS_OF)}, coefficients, those of the thesis (`--model"
                 " list`), or a TOML file"
             )
@@ -158,7 +159,16 @@ def _terms(given: CoefficientModel | Path | str) -> CoefficientModel:
 
 def known_methods() -> dict[str, str]:
     """Return every method of linear models with a line about it."""
-    return {**STAGED, **single_methods()}
+    return {**STAGED, **single_methods(), **STAGED}  # listed first, and nobody's else
+
+
+def method_lines() -> list[str]:
+    """Return every method with a line about it and the options that it takes."""
+    taken = {n: ", ".join(o.name for o in by.options) for n, by in all_methods().items()}
+    return [
+        f"{name:26s} {about}{f' (options: {taken[name]})' if taken.get(name) else ''}"
+        for name, about in known_methods().items()
+    ]
 
 
 def requested_methods(given: str | Iterable[str] | None) -> tuple[str, ...]:
@@ -170,9 +180,9 @@ def requested_methods(given: str | Iterable[str] | None) -> tuple[str, ...]:
         If there is no such method.
     """
     requested = tuple(dict.fromkeys(map(str, listed(given) or [DEFAULT_METHOD])))
-    known = known_methods()
-    unknown = [m for m in requested if m not in known]
+    unknown = [m for m in requested if m not in STAGED and find_method(m) is None]
     if unknown:
+        known = known_methods()
         meant = like(unknown[0], known)
         raise IdentificationError(
             f"unknown method {', '.join(unknown)}{meant}; known: {', '.join(known)}"

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from host.errors import IdentificationError
 from host.sysid import fit
-from host.sysid.estimators.hopfield import (
+from host.sysid.numerics.output_error_problem import OutputProblem
+from host.thesis.error_figures import thesis_program_error_percent
+from host.thesis.hopfield import (
     LAMBDA,
     RHO,
     STEP_S,
@@ -12,8 +14,6 @@ from host.sysid.estimators.hopfield import (
     line_search,
     network,
 )
-from host.sysid.models.diagnostics import thesis_program_error_percent
-from host.sysid.numerics.output_error_problem import OutputProblem
 from studies.aircraft import navion_free
 from studies.data import with_rates
 

@@ -25,12 +25,12 @@ from host.compiled import compiled
 from host.errors import IdentificationError
 from host.sysid.estimators.equation_error import fit_equation_error
 from host.sysid.estimators.regression import normal_equations, regression_equations
-from host.sysid.models.diagnostics import thesis_program_error_percent
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.recursion import simulate
+from host.thesis.error_figures import thesis_program_error_percent
 
 LAMBDA = 0.001  # thesis, section 3.2.3
 RHO = 200.0

@@ -8,20 +8,21 @@ import pytest
 from host.cli import main
 from host.readers.derived_columns import derived_columns
 from host.sysid.models.model_file import read_model
-from host.sysid.models.thesis_models import FOLDER, model_path, shipped_lines, shipped_models
+from host.sysid.models.named_models import model_path, shipped_files, shipped_lines
 from host.sysid.pipeline.requested_models import requested_models
+from host.thesis.thesis_methods import MODELS
 
-PUBLISHED = [name for name in shipped_models() if re.search("eq5|table", name)]
+PUBLISHED = [name for name in shipped_files() if re.search("eq5|table", name)]
 
 
 def test_all_of_the_thesis_are_there() -> None:
     assert set(PUBLISHED) == {
         "thesis-eq5-5", "thesis-eq5-8", "thesis-eq5-11", "thesis-eq5-12", "thesis-table3-1"
     }  # fmt: skip
-    assert len(shipped_models()) == 11
+    assert len(shipped_files()) == 11
 
 
-@pytest.mark.parametrize("name", shipped_models())
+@pytest.mark.parametrize("name", shipped_files())
 def test_every_one_is_read_by_its_name(name: str) -> None:
     ((_, model),) = requested_models(name).linear
     assert model is not None
@@ -32,7 +33,7 @@ def test_every_one_is_read_by_its_name(name: str) -> None:
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_poles_are_those_it_says(name: str) -> None:
     A = read_model(model_path(name)).matrices(np.zeros(0))[0]
-    said = (FOLDER / f"{name}.toml").read_text().split("# poles: ")[1].splitlines()[0]
+    said = (MODELS / f"{name}.toml").read_text().split("# poles: ")[1].splitlines()[0]
     found = sorted(np.linalg.eigvals(A), key=lambda z: (-abs(z), -z.imag))
     expected: list[complex] = []
     for text in said.split(", "):

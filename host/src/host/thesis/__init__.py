@@ -1,0 +1,1 @@
+"""What belongs to the thesis alone: its networks, its other estimators, its printed models."""
