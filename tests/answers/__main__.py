@@ -21,6 +21,8 @@ from tests.answers.cases import CASES
 from tests.answers.comparison import STRICT, moved
 from tests.answers.frozen_answer import fewer_hold, freeze, frozen, held
 
+MOST_LINES = 20
+
 
 def main() -> int:
     """Identify every case asked for; print a line for each, and what moved."""
@@ -35,6 +37,7 @@ def main() -> int:
     parser.add_argument(
         "--tolerance", type=float, default=STRICT, help="share of the half-width (default 1e-9)"
     )
+    parser.add_argument("--full", action="store_true", help="print every line that moved")
     asked = parser.parse_args()
     known = {case.name: case for case in CASES}
     if strange := set(asked.names) - set(known):
@@ -47,7 +50,7 @@ def main() -> int:
         fewer = [] if old is None else fewer_hold(old, new, asked.tolerance)
         took_s = time.process_time() - start_s
         print(f"{name}: {len(lines)} moved; {held(new) or 'no truth'} ({took_s:.1f} s)", flush=True)
-        print("".join(f"    {line}\n" for line in (*lines, *fewer)), end="")
+        print("".join(f"    {line}\n" for line in (*shown(lines, asked.full), *fewer)), end="")
         if asked.update and fewer and not asked.lower:
             print("    not frozen: fewer intervals hold; --lower freezes it, a note says why")
             bad = 1
@@ -56,6 +59,13 @@ def main() -> int:
         elif lines or fewer:
             bad = 1
     return bad
+
+
+def shown(lines: list[str], full: bool) -> list[str]:
+    """Return the lines to print: the first, unless all were asked for."""
+    if full or len(lines) <= MOST_LINES:
+        return lines
+    return [*lines[:MOST_LINES], f"... and {len(lines) - MOST_LINES} more: --full"]
 
 
 if __name__ == "__main__":

@@ -142,12 +142,12 @@ def _off(answers: Sequence[Record], truth: Mapping[str, Any]) -> dict[str, float
     """Return how far each estimate is from the truth in half-widths: below 1 its interval holds."""
     found = {}
     for one in answers:
-        speed = one["figures"]["airspeed_mps"] / truth["airspeed_mps"]
+        speed = (one["figures"]["airspeed_mps"] or truth["airspeed_mps"]) / truth["airspeed_mps"]
         for name, (value, power) in truth["values"].get(one["template"], {}).items():
             if name in one["estimates"]:
                 estimate, half_width = one["estimates"][name]
                 off = abs(estimate - value * speed**power) / half_width
-                found[f"{one['template']}, {name}"] = round(off, 4)
+                found[f"{one['template']}, {one['method']}, {name}"] = round(off, 4)
     return found
 
 

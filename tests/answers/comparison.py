@@ -8,7 +8,7 @@ their words; numbers in them may differ by a unit of their last digit.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 from tests.answers.answer_record import Record
@@ -16,34 +16,38 @@ from tests.answers.answer_record import Record
 STRICT, DEFAULT = 1e-9, 1e-2
 DERIVED = 10.0  # tolerances that a function of many estimates may move
 ROUNDING = 1e-12  # of a value, where it has no width
-MARK_LIMITS = (0.1, 0.3)  # half-width over value, where marks change
+MARK_LIMITS = (0.1, 0.12, 0.3)  # half-width over value, where marks change (IDENTIFY.md)
 # A number, not a digit of a name (v2_rad) or of a kind of input (3-2-1-1).
 NUMBER = re.compile(r"(?<![\w.-])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w-]|\.\d)")
-TEXTS = ("verdict", "warnings")
 
 
 def moved(old: Record, new: Record, tolerance: float) -> list[str]:
     """Return a line for everything that moved beyond the tolerance."""
     if "refused" in old or "refused" in new:
-        both = (("refused", one.get("refused", ["answered"])) for one in (old, new))
-        (_, was), (_, now) = both
+        was, now = (one.get("refused", ["answered"]) for one in (old, new))
         return list(_texts("refusal", was, now))
     lines = [
         *_texts("notes", old["notes"], new["notes"]),
         *_findings(old["findings"], new["findings"]),
-        *_marks("table", old["marks"], new["marks"], _shares(old), tolerance),
     ]
-    was, now = (
+    before, after = (
         {f"{a['template']}, {a['method']}": a for a in one["answers"]} for one in (old, new)
     )
-    lines += _names("answers", was, now)
-    for label in was:
-        if label in now:
-            lines += (f"{label}: {line}" for line in _of_answer(was[label], now[label], tolerance))
+    lines += _names("answers", before, after)
+    near: set[str] = set()
+    for label in before:
+        if label in after:
+            at_limit = _at_limit(before[label], tolerance)
+            near |= {f"{before[label]['template']}/{name}" for name in at_limit}
+            found = _of_answer(before[label], after[label], tolerance, at_limit)
+            lines += (f"{label}: {line}" for line in found)
+    lines += _marks("table", old["marks"], new["marks"], near)
     return lines
 
 
-def _of_answer(old: Record, new: Record, tolerance: float) -> Iterator[str]:
+def _of_answer(
+    old: Record, new: Record, tolerance: float, at_limit: Collection[str]
+) -> Iterator[str]:
     estimates, others = old["estimates"], new["estimates"]
     yield from _names("estimates", estimates, others)
     for name in estimates:
@@ -65,15 +69,17 @@ def _of_answer(old: Record, new: Record, tolerance: float) -> Iterator[str]:
         elif was is not now:
             yield f"{name} {was} -> {now}"
     yield from _correlations(old["correlation"], new["correlation"], tolerance)
-    yield from _marks("marks", old["marks"], new["marks"], {}, 0.0)
+    yield from _marks("marks", old["marks"], new["marks"], at_limit)
     for name in old["reasons"]:
         yield from _texts(f"reasons of {name}", old["reasons"][name], new["reasons"].get(name, []))
     for key in ("causes", "template", "model", "method", "converged", "residual_kind", "at_bound",
                 "unpredicted", "constant_inputs", "maneuvers", "held_out", "refused"):  # fmt: skip
         if old.get(key) != new.get(key):
             yield f"{key}: {old.get(key)} -> {new.get(key)}"
-    for key in TEXTS:
-        yield from _texts(key, old[key], new[key])
+    yield from _texts("warnings", old["warnings"], new["warnings"])
+    changed = {name for name in at_limit if old["marks"].get(name) != new["marks"].get(name)}
+    if not changed:  # the verdict names parameters by their marks
+        yield from _texts("verdict", old["verdict"], new["verdict"])
 
 
 def _estimate(name: str, old: list[Any], new: list[Any], tolerance: float) -> Iterator[str]:
@@ -119,28 +125,29 @@ def _words(finding: Mapping[str, Any]) -> list[str]:
 
 
 def _marks(
-    what: str,
-    old: Mapping[str, str],
-    new: Mapping[str, str],
-    shares: Mapping[str, float],
-    tolerance: float,
+    what: str, old: Mapping[str, str], new: Mapping[str, str], at_limit: Collection[str]
 ) -> Iterator[str]:
-    """Compare marks; one may change where its half-width lies that near to a limit."""
+    """Compare marks; those of parameters at a limit may differ."""
     for name in {**old, **new}:
         was, now = old.get(name, "none"), new.get(name, "none")
-        share = shares.get(name.split("/")[-1], 0.0)
-        near = any(abs(share - limit) <= 2.0 * tolerance * limit for limit in MARK_LIMITS)
-        if was != now and not near:
+        if was != now and name not in at_limit:
             yield f"{what}: {name} {was} -> {now}"
 
 
-def _shares(record: Record) -> dict[str, float]:
-    """Return half-width over value of every estimate."""
-    return {
+def _at_limit(answer: Record, tolerance: float) -> set[str]:
+    """Return the parameters whose half-width over value is that near to where marks change.
+
+    Value and half-width may each move by a tolerance.
+    """
+    shares = {
         name: half / abs(value)
-        for one in record["answers"]
-        for name, (value, half) in one["estimates"].items()
+        for name, (value, half) in answer["estimates"].items()
         if value and half is not None
+    }
+    return {
+        name
+        for name, share in shares.items()
+        if any(abs(share / limit - 1.0) <= 2.0 * tolerance for limit in MARK_LIMITS)
     }
 
 

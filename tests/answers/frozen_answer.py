@@ -38,7 +38,7 @@ def fewer_hold(old: Record, new: Record, tolerance: float) -> list[str]:
     before = sum(x <= 1.0 for x in was.values())
     after = sum(x <= 1.0 + 2.0 * tolerance for x in now.values())
     lost = [name for name, x in was.items() if x <= 1.0 < now.get(name, 2.0)]
-    return [f"{before} intervals held, {after} do: not {', '.join(lost)}"] if after < before else []
+    return [f"{before} intervals held, {after} do: not {'; '.join(lost)}"] if after < before else []
 
 
 def _text(value: Any, depth: int = 0) -> str:

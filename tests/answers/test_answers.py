@@ -2,6 +2,7 @@
 
 import pytest
 
+from tests.answers.answer_record import Record
 from tests.answers.case import Case
 from tests.answers.cases import CASES
 from tests.answers.comparison import STRICT, moved, same_text
@@ -45,3 +46,17 @@ def test_an_estimate_that_moves_by_a_billionth_of_its_width_is_seen() -> None:
     [line] = moved(old, new, STRICT)
     assert "M_alpha" in line and "2e-09 half-widths" in line
     assert not moved(old, new, 1e-8)
+
+
+def test_a_mark_may_change_only_where_its_width_is_at_a_limit() -> None:
+    def marked(mark: str, half_width: float) -> Record:
+        record = frozen("twin-log-calibrated")
+        assert record is not None
+        answer = record["answers"][0]
+        answer["estimates"]["M_q"] = [-10.0, half_width]
+        answer["marks"]["M_q"] = record["marks"]["longitudinal/M_q"] = mark
+        return record
+
+    assert not moved(marked("trust", 0.9995), marked("use with care", 1.0005), 1e-2)
+    changed = moved(marked("trust", 0.9), marked("use with care", 0.9), 1e-2)
+    assert len([line for line in changed if "M_q trust -> use with care" in line]) == 2
