@@ -15,14 +15,14 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from host.aircraft.mass_properties import airframe_data
+from host.arrays import Array
 from host.constants import NORMAL_95
 from host.errors import IdentificationError
 from host.readers.even_grid import even_columns
 from host.sysid.answer.truth_comparison import true_coefficients
-from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, identify_coefficients
-from host.sysid.flight.linear_estimator import identify
+from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 from host.sysid.flight.maneuver_detection import DetectedManeuver
+from host.sysid.pipeline import at_hand, identify_columns
 from host.twin.sensors.sensor_delays import dlpf_for, sensor_delays
 from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight
@@ -144,12 +144,25 @@ def study(card: str, seeds: range, *, thesis: bool) -> CoefficientTally:
         flight = virtual_flight(card, seed)
         columns, _ = even_columns(flight.table)
         try:
-            result.add(identify_coefficients(columns, AIRCRAFT), flight)
+            result.add(direct_answer(columns), flight)
         except IdentificationError:
             result.coefficients.failed += 1
         for method, tally in result.thesis.items():
             add_thesis(tally, card, seed, method)
     return result
+
+
+def direct_answer(columns: Mapping[str, Array]) -> CoefficientAnswer:
+    """Return the coefficients of `host identify --model coefficients`.
+
+    Raises
+    ------
+    IdentificationError
+        If they cannot be told.
+    """
+    found = identify_columns(at_hand(columns, aircraft=AIRCRAFT), models="coefficients")
+    assert found.coefficients is not None
+    return found.coefficients
 
 
 def add_thesis(tally: Tally, card: str, seed: int, method: str) -> None:
@@ -169,10 +182,10 @@ def add_thesis(tally: Tally, card: str, seed: int, method: str) -> None:
     ]
     for name in ("longitudinal", "lateral"):
         try:
-            answers = identify(
-                columns, names=(name,), method=method, airframe=airframe_data(AIRCRAFT),
-                windows=windows, with_delays=False,
-            )  # fmt: skip
+            flown = at_hand(
+                columns, aircraft=AIRCRAFT, windows=windows, corrections=False, delays=False
+            )
+            answers = identify_columns(flown, models=name, methods=method).linear
         except IdentificationError:
             tally.failed += 1
             continue

@@ -10,13 +10,9 @@ import sys
 from collections.abc import Sequence
 
 import numpy as np
-from host.aircraft.mass_properties import airframe_data
-from host.aircraft.powerplant import powerplant
-from host.instrument.deviations import sensor_error_model
 from host.readers.even_grid import even_columns
 from host.sysid.answer.truth_comparison import true_coefficients
-from host.sysid.compatibility.reconstruction import reconstruct
-from host.sysid.flight.linear_estimator import identify
+from host.sysid.pipeline import at_hand, identify_columns
 from host.twin.virtual import virtual_flight
 
 from studies.stored_rows import flown_rows, seeded_run
@@ -33,13 +29,7 @@ def rows_of(seed: int) -> list[dict[str, object]]:
     """Fly and identify as the verb does; every coefficient of both axes."""
     flight = virtual_flight(CARD, seed)
     columns, _ = even_columns(flight.table)
-    airframe = airframe_data(AIRCRAFT)
-    answers = identify(
-        columns,
-        airframe=airframe,
-        compatibility=reconstruct(columns, airframe, sensor_error_model(AIRCRAFT)),
-        powerplant=powerplant(AIRCRAFT),
-    )
+    answers = identify_columns(at_hand(columns, aircraft=AIRCRAFT)).linear
     rows: list[dict[str, object]] = []
     for answer in answers:
         truth = true_coefficients({"maneuver": list(flight.maneuvers)}, answer.template)

@@ -17,15 +17,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from host.aircraft.mass_properties import airframe_data
-from host.aircraft.powerplant import powerplant
 from host.errors import IdentificationError
-from host.instrument.deviations import sensor_error_model
 from host.sysid.answer.truth_comparison import read_truth, true_coefficients
-from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.flight.flight_tables import read_columns
-from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_detection import DetectedManeuver, detect_maneuvers
+from host.sysid.pipeline import at_hand, identify_columns
 
 FIRST_SEED = 200
 OVERLAP = 0.8
@@ -122,13 +118,7 @@ def add_flight(tally: Tally, folder: Path, *, fit: bool, aircraft: str = "ultras
     if not fit:
         return
     try:
-        airframe = airframe_data(aircraft)
-        answers = identify(
-            columns,
-            airframe=airframe,
-            compatibility=reconstruct(columns, airframe, sensor_error_model(aircraft)),
-            powerplant=powerplant(aircraft),
-        )
+        answers = identify_columns(at_hand(columns, aircraft=aircraft)).linear
     except IdentificationError:
         tally.failed += 1
         return

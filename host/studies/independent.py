@@ -22,10 +22,10 @@ import pandas as pd
 from host.compiled import prefer_machine_code
 from host.errors import IdentificationError
 from host.instrument.instrument_errors import usual_errors
-from host.physical.recording import FOREIGN
+from host.physical.recording import FOREIGN, Recording
 from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.answer.verdict import verdict_of
-from host.sysid.flight.linear_estimator import identify
+from host.sysid.pipeline import at_hand, identify_columns
 
 import host
 from studies.foreign.aeroplane import TRAINER
@@ -97,7 +97,8 @@ def dimensional(measured: Columns, axis: str) -> Iterator[Found]:
     """
     # The airspeed of these flights has noise, no error of scale.
     exact = usual_errors(FOREIGN).scaled(0.0, "pitot_scale", "pitot_zero_pa", "density_share")
-    [answer] = identify(dict(measured), names=(axis,), maker=FOREIGN, errors=exact)
+    flown = at_hand(measured, recording=Recording(maker=FOREIGN), errors=exact)
+    [answer] = identify_columns(flown, models=axis).linear
     expected = derivatives(answer.trim.airspeed_mps)  # where the answer says that it holds
     half, result = answer.result.half_width(), answer.result
     marks = verdict_of(answer).marks

@@ -15,20 +15,17 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from host.aircraft.mass_properties import AirframeData, airframe_data
-from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.readers.even_grid import even_columns
 from host.readers.recorded import recording_of_table
-from host.sysid.coefficients.coefficient_estimator import identify_coefficients
-from host.sysid.compatibility.reconstruction import reconstruct
-from host.sysid.compatibility.servo_response import surface_positions
-from host.sysid.flight.linear_estimator import identify
+from host.sysid.pipeline import aircraft_data, at_hand, identify_columns
 from host.twin.faults import Fault
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
 
 AIRCRAFT = "ultrastick25e"
+MODELS = ("coefficients", "longitudinal", "lateral")
 MOVED = 0.01  # of a half-width: less is rounding of the search
 GROUPS: dict[str, tuple[str, ...]] = {
     "gyro bias": ("gyro_bias_radps",),
@@ -122,15 +119,15 @@ def answers(
     columns: Columns, airframe: AirframeData, data: SensorErrorModel
 ) -> dict[str, Interval]:
     """Return both answers of `host identify`: coefficients, then the linear one's."""
-    direct = identify_coefficients(columns, AIRCRAFT, airframe=airframe, instrument=data)
-    result = {f"{d.name} (direct)": (d.value, d.half_width) for d in direct.fit.derivatives}
-    linear = identify(
-        dict(columns),
-        airframe=airframe,
-        compatibility=reconstruct(columns, airframe, data),
-        powerplant=powerplant(AIRCRAFT),
+    known = replace(aircraft_data(AIRCRAFT), airframe=airframe, instrument=data)
+    found = identify_columns(
+        at_hand(columns, aircraft=known, recording=data.recording), models=MODELS
     )
-    for answer in linear:
+    result: dict[str, Interval] = {}
+    if found.coefficients is not None:
+        direct = found.coefficients.coefficients
+        result |= {f"{c.name} (direct)": (c.value, c.half_width) for c in direct}
+    for answer in found.linear:
         result |= {f"{c.name} (linear)": (c.value, c.half_width) for c in answer.coefficients}
     return result
 
@@ -183,7 +180,7 @@ def flight(card: str, seed: int, *, bare: bool = False) -> Flown:
     columns, _ = even_columns(table)
     recording = recording_of_table(columns, table.attrs)
     data = sensor_error_model(AIRCRAFT).recorded(recording)
-    return surface_positions(columns, data), data
+    return columns, data
 
 
 def lines(flown: Flown, bare: Flown, groups: Mapping[str, tuple[str, ...]]) -> Iterator[str]:

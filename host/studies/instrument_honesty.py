@@ -27,8 +27,8 @@ from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.instrument.instrument_errors import InstrumentErrors, instrument_errors
 from host.readers.even_grid import even_columns
-from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
+from host.sysid.pipeline import aircraft_data, at_hand, identify_columns
 from host.twin.testcard.cards import Card, load
 from host.twin.virtual import VirtualFlight, virtual_flight
 
@@ -111,12 +111,16 @@ def analysed(flight: VirtualFlight, seed: int, factor: float) -> Row:
     except IdentificationError as error:
         row["failed"] = str(error)  # no check, so no doubt
     try:
-        answer = identify_coefficients(columns, AIRCRAFT, airframe=airframe, instrument=data)
+        known = replace(aircraft_data(AIRCRAFT), airframe=airframe, instrument=data)
+        answer = identify_columns(
+            at_hand(columns, aircraft=known), models="coefficients"
+        ).coefficients
     except IdentificationError as error:
         return row | {"failed": str(error)}
-    for d in answer.fit.derivatives:
-        if d.name in COUNTED:
-            row["intervals"][d.name] = [d.value - expected[d.name], d.half_width]
+    assert answer is not None
+    for c in answer.coefficients:
+        if c.name in COUNTED:
+            row["intervals"][c.name] = [c.value - expected[c.name], c.half_width]
     return row
 
 

@@ -16,14 +16,11 @@ from typing import Any
 
 import numpy as np
 from host.aircraft.mass_properties import AirframeData, airframe_data
-from host.aircraft.powerplant import powerplant
 from host.errors import IdentificationError
-from host.instrument.deviations import sensor_error_model
 from host.readers.even_grid import even_columns
 from host.sysid.answer.truth_comparison import true_coefficients
-from host.sysid.compatibility.reconstruction import reconstruct
-from host.sysid.flight.linear_estimator import from_zero, identify
 from host.sysid.flight.linear_model import AXIS_OF, DEFAULT_METHOD
+from host.sysid.pipeline import at_hand, identify_columns
 from host.twin.virtual import VirtualFlight, virtual_flight
 
 from studies.flights import Tally
@@ -56,16 +53,11 @@ def study(card: str, seeds: range, method: str = DEFAULT_METHOD) -> tuple[Tally,
 def add(flight: VirtualFlight, method: str, estimated: Tally, printed: Tally) -> None:
     """Count one flight, its answers as `host identify` gives them."""
     columns, _ = even_columns(flight.table)
-    airframe, maneuvers = airframe_data(AIRCRAFT), list(flight.maneuvers)
+    maneuvers = list(flight.maneuvers)
     try:
-        answers = identify(
-            columns,
-            names=AXES,
-            method=method,
-            airframe=airframe,
-            compatibility=reconstruct(columns, airframe, sensor_error_model(AIRCRAFT)),
-            powerplant=powerplant(AIRCRAFT),
-        )
+        answers = identify_columns(
+            at_hand(columns, aircraft=AIRCRAFT), models=AXES, methods=method
+        ).linear
     except IdentificationError:
         estimated.failed += 1
         return
@@ -75,12 +67,12 @@ def add(flight: VirtualFlight, method: str, estimated: Tally, printed: Tally) ->
         local = true_coefficients({"maneuver": maneuvers}, answer.template)
         doubted = {r.name for r in answer.identifiability_flags}
         for c in answer.coefficients:
-            truth, flagged = local[c.name], not from_zero(c)
+            truth, flagged = local[c.name], not c.differs_from_zero
             estimated.add(
                 c.name, truth, c.value, c.half_width, flagged=flagged, size=_size(c.name, local)
             )
         half = answer.result.half_width()
-        expected = derivatives(local, maneuvers, answer.template, airframe, flown)
+        expected = derivatives(local, maneuvers, answer.template, airframe_data(AIRCRAFT), flown)
         for name, truth in expected.items():
             if name in answer.result.names:
                 k = answer.result.index(name)

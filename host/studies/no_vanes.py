@@ -31,9 +31,9 @@ from host.instrument.instrument_errors import (
 from host.physical.recording import AUTOPILOT
 from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
-from host.sysid.pipeline.aircraft_data import aircraft_data
-from host.sysid.pipeline.flight_preparation import prepare
+from host.sysid.pipeline import prepare, read_flight
 from host.sysid.pipeline.identification import Identification
+from host.sysid.pipeline.known_aircraft import aircraft_data
 from host.sysid.pipeline.reading_options import ReadingOptions
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.outcome.autopilot_logs import write_autopilot_log
@@ -81,7 +81,7 @@ def rows_of(seed: int, turbulence_mps: float, *, beside: bool = False) -> Iterat
         except IdentificationError as error:
             yield {**key, "name": "refused", "mark": str(error)[:80]}
             return
-        bare = prepare(path, ReadingOptions(), aircraft_data(AIRCRAFT))
+        bare = prepare(read_flight(path, ReadingOptions(), aircraft_data(AIRCRAFT)))
         vanes = {}
         if beside:
             # The same flight of our own instrument: an autopilot's errors are not ours.

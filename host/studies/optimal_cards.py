@@ -13,19 +13,12 @@ from functools import cache
 
 import numpy as np
 from host.aircraft.file import load
-from host.aircraft.mass_properties import airframe_data
-from host.aircraft.powerplant import powerplant
 from host.constants import NORMAL_95
 from host.errors import IdentificationError
-from host.instrument.deviations import sensor_error_model
 from host.planning.optimal_card import optimal_card, standard_card
 from host.planning.prior_range import random_aircraft
-from host.readers.even_grid import even_arrays
-from host.readers.foreign_tables import from_frame
-from host.readers.recorded import recording_of_table
 from host.sysid.answer.truth_comparison import true_coefficients
-from host.sysid.compatibility.reconstruction import reconstruct
-from host.sysid.flight.linear_estimator import identify
+from host.sysid.pipeline import identify
 from host.twin.testcard.cards import BEFORE_S, Card, Pilot, Segment, duration_s
 from host.twin.virtual import virtual_flight
 
@@ -79,20 +72,11 @@ def rows_of(name: str, seed: int) -> list[dict[str, object]]:
     card = cards()[name]
     card = replace(card, pilot=hand_of(seed)) if name == HAND else card
     flight = virtual_flight(card, seed, chain="gps", aircraft=random_aircraft(load(AIRCRAFT), seed))
-    table = from_frame(flight.table)
-    columns, _ = even_arrays(table.columns)
-    airframe = airframe_data(AIRCRAFT)
-    instrument = sensor_error_model(AIRCRAFT).recorded(recording_of_table(table.columns, {}))
     flown_s = round(duration_s(card) - card.flight.ground_s, 1)
     try:
-        answers = identify(
-            columns,
-            airframe=airframe,
-            compatibility=reconstruct(columns, airframe, instrument),
-            powerplant=powerplant(AIRCRAFT),
-        )
+        answers = identify(flight.table, aircraft=AIRCRAFT).linear
     except IdentificationError:
-        answers = []
+        answers = ()
     rows: list[dict[str, object]] = []
     for answer in answers:
         truth = true_coefficients({"maneuver": list(flight.maneuvers)}, answer.template)

@@ -12,15 +12,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from host.aircraft.mass_properties import airframe_data
-from host.aircraft.powerplant import powerplant
-from host.instrument.deviations import sensor_error_model
 from host.planning.card_planning import design
 from host.planning.predicted_widths import predict_widths
 from host.readers.even_grid import even_columns
 from host.sysid.answer.truth_comparison import true_coefficients
-from host.sysid.compatibility.reconstruction import reconstruct
-from host.sysid.flight.linear_estimator import identify
+from host.sysid.pipeline import at_hand, identify_columns
 from host.twin.testcard.cards import Card, load
 from host.twin.virtual import virtual_flight
 
@@ -52,13 +48,7 @@ def rows_of(
     """Fly and identify as the verbs do; the principal derivatives of both axes."""
     flight = virtual_flight(card, seed)
     columns, _ = even_columns(flight.table)
-    airframe = airframe_data(card.aircraft)
-    answers = identify(
-        columns,
-        airframe=airframe,
-        compatibility=reconstruct(columns, airframe, sensor_error_model(card.aircraft)),
-        powerplant=powerplant(card.aircraft),
-    )
+    answers = identify_columns(at_hand(columns, aircraft=card.aircraft)).linear
     rows: list[dict[str, object]] = []
     for answer in answers:
         truth = true_coefficients({"maneuver": list(flight.maneuvers)}, answer.template)

@@ -17,12 +17,12 @@ from host.arrays import Array
 from host.compiled import prefer_machine_code
 from host.constants import GRAVITY_MPS2
 from host.errors import IdentificationError
-from host.physical.recording import FOREIGN
+from host.physical.recording import FOREIGN, Recording
 from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.answer.verdict import verdict_of
-from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.models.templates import Trim, template
+from host.sysid.pipeline import at_hand, identify_columns
 from scipy import signal
 
 from studies.foreign.flight import derivatives
@@ -133,7 +133,8 @@ def rows_of(
     columns, maneuver = record(aircraft, AIRS[air], model_name, length_s, seed)
     key = (seed, name, air, model_name, length_s)
     try:
-        [answer] = identify(columns, names=(model_name,), windows=(maneuver,), maker=FOREIGN)
+        flown = at_hand(columns, windows=(maneuver,), recording=Recording(maker=FOREIGN))
+        [answer] = identify_columns(flown, models=model_name).linear
     except IdentificationError:
         yield dict(zip(COLUMNS, (*key, "refused"), strict=False))
         return

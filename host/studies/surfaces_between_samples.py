@@ -13,10 +13,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from host.arrays import Array
 from host.compiled import prefer_machine_code
-from host.physical.recording import FOREIGN
-from host.sysid.flight.linear_estimator import identify
+from host.physical.recording import FOREIGN, Recording
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.models.templates import Trim, template
+from host.sysid.pipeline import at_hand, identify_columns
 from scipy import linalg, signal
 
 from studies.stored_rows import flown_rows, seeded_run
@@ -122,7 +122,8 @@ def _command(size: float, at_s: float) -> Array:
 def rows_of(seed: int, motion: str, rate_hz: int) -> Iterator[dict[str, object]]:
     """Fly once, identify, and return a row of each principal derivative."""
     columns, windows = flown(motion, rate_hz, seed)
-    [answer] = identify(columns, names=(LATERAL,), windows=windows, maker=FOREIGN)
+    record = at_hand(columns, windows=windows, recording=Recording(maker=FOREIGN))
+    [answer] = identify_columns(record, models=LATERAL).linear
     half = answer.result.half_width()
     for name in PRINCIPAL[LATERAL]:
         k = answer.result.index(name)

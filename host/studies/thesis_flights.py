@@ -20,9 +20,9 @@ from host.arrays import Array
 from host.errors import IdentificationError
 from host.readers.even_grid import even_columns
 from host.sysid.estimators.equation_error import fit_equation_error
-from host.sysid.flight.linear_estimator import identify
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, free_model
+from host.sysid.pipeline import at_hand, identify_columns
 from host.thesis.error_figures import thesis_program_error_percent, thesis_sum_of_mean_errors
 from host.thesis.hopfield import SWEEPS, free_run, line_search, network
 from host.twin.virtual import VirtualFlight, virtual_flight
@@ -137,7 +137,7 @@ def product(case: Case, seed: int) -> tuple[float, float]:
     flight = virtual_flight(case.card, seed)
     columns, _ = even_columns(flight.table)
     name = "longitudinal" if case.axis == "elevator" else "lateral"
-    answer = identify(columns, names=(name,))[0]
+    [answer] = identify_columns(at_hand(columns), models=name).linear
     axes = ("elevator",) if name == "longitudinal" else ("aileron", "rudder")
     true = [
         m["modes"][case.mode][0]

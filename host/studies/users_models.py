@@ -13,10 +13,10 @@ from collections.abc import Sequence
 import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.linear_model import DEFAULT_METHOD
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.models.model_file import model_from
+from host.sysid.pipeline import at_hand, identify_columns
 from scipy import signal
 
 from studies.inputs import multistep_3211
@@ -88,13 +88,8 @@ def rows_of(noise: str, seed: int) -> list[dict[str, object]]:
     found: list[dict[str, object]] = []
     for method in METHODS:
         try:
-            [answer] = identify(
-                columns,
-                names=("short-period",),
-                method=method,
-                windows=[window],
-                user_model=model_from(MODEL),
-            )
+            record = at_hand(columns, windows=[window])
+            [answer] = identify_columns(record, models=model_from(MODEL), methods=method).linear
         except IdentificationError:
             found.append(dict.fromkeys(COLUMNS, "") | {"noise": noise, "seed": seed})
             continue

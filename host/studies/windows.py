@@ -19,16 +19,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from host.aircraft.mass_properties import airframe_data
-from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.instrument.deviations import sensor_error_model
 from host.readers.even_grid import even_columns
 from host.sysid.answer.truth_comparison import true_coefficients
-from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.estimators.method_registry import fit
-from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_detection import FLYING_SHARE, detect_maneuvers
 from host.sysid.flight.maneuver_selection import SURFACES, joined_windows, select_maneuvers
 from host.sysid.models.fit_result import FitResult
@@ -36,6 +31,7 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
 from host.sysid.numerics.output_error import covariance_of_free, minimise
 from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.pipeline import at_hand, identify_columns
 from host.twin.virtual import virtual_flight
 
 from studies.aircraft import navion_structured
@@ -200,8 +196,6 @@ def twin_row(card: str, seed: int) -> Row:
     flight = virtual_flight(card, seed)
     aircraft = flight.record.aircraft.name
     columns, _ = even_columns(flight.table)
-    airframe = airframe_data(aircraft)
-    checked = reconstruct(columns, airframe, sensor_error_model(aircraft))
     t, speed = columns["t_s"], columns["airspeed_mps"]
     up = t[speed > FLYING_SHARE * float(np.median(speed))]
     whole = select_maneuvers(columns, stretches=[(float(up[0]) + SETTLED_S, float(up[-1]))])
@@ -215,10 +209,8 @@ def twin_row(card: str, seed: int) -> Row:
         row["names"] += names
         for label, windows in both.items():
             try:
-                [answer] = identify(
-                    columns, names=(axis,), airframe=airframe, windows=windows,
-                    compatibility=checked, powerplant=powerplant(aircraft),
-                )  # fmt: skip
+                flown = at_hand(columns, aircraft=aircraft, windows=windows)
+                [answer] = identify_columns(flown, models=axis).linear
             except IdentificationError:
                 row[label] += [None] * len(names)
                 continue

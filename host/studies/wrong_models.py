@@ -17,15 +17,15 @@ from pathlib import Path
 import numpy as np
 from host.compiled import prefer_machine_code
 from host.errors import IdentificationError
-from host.physical.recording import FOREIGN
+from host.physical.recording import FOREIGN, Recording
 from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.linear_estimator import identify
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.numerics.input_coherence import input_coherence
 from host.sysid.numerics.output_error import minimise
 from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.pipeline import at_hand, identify_columns
 
 from studies.aircraft import navion_structured
 from studies.coverage import NOISES as NOISE_COLOURS
@@ -106,14 +106,9 @@ def judge(row: Row, seed: int, limit: dict[str, float]) -> list[Judged]:
 
 def answer_to(row: Row, flight: LinearFlight) -> Answer:
     """Return the answer of `host identify` to a flight."""
-    [answer] = identify(
-        flight.columns,
-        names=(row.template,),
-        method=row.method,
-        windows=flight.windows,
-        user_model=flight.model,
-        maker=FOREIGN,
-    )
+    flown = at_hand(flight.columns, windows=flight.windows, recording=Recording(maker=FOREIGN))
+    model = flight.model or row.template
+    [answer] = identify_columns(flown, models=model, methods=row.method).linear
     return answer
 
 

@@ -28,8 +28,8 @@ from host.arrays import Array
 from host.constants import GRAVITY_MPS2, NORMAL_95
 from host.errors import IdentificationError
 from host.sysid.flight.maneuver_detection import DetectedManeuver
-from host.sysid.pipeline.aircraft_data import aircraft_data
-from host.sysid.pipeline.flight_preparation import prepare
+from host.sysid.pipeline import prepare, read_flight
+from host.sysid.pipeline.known_aircraft import aircraft_data
 from host.sysid.pipeline.reading_options import ReadingOptions
 from numpy.typing import NDArray
 
@@ -69,7 +69,7 @@ def by_aeroid(path: Path, aircraft: str, limit_s: int) -> tuple[Intervals, float
 
 
 def _print_axes(path: Path, aircraft: str) -> None:
-    flight = prepare(path, ReadingOptions(), aircraft_data(aircraft)).flight
+    flight = prepare(read_flight(path, ReadingOptions(), aircraft_data(aircraft))).flight
     frame = airframe_data(aircraft)
     columns = dict(flight.corrected)
     columns["qbar_pa"] = 0.5 * columns["density_kgpm3"] * columns["airspeed_mps"] ** 2

@@ -8,9 +8,10 @@ from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
 from host.physical.calibration import load_calibration
 from host.readers.even_grid import even_columns
-from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.twin.outcome.virtual_calibration import calibration
 from host.twin.virtual import virtual_flight
+
+from tests.host.sysid.at_hand import identify_coefficients
 
 NAME = "ultrastick25e"
 # Lines of a calibration, the number in them, and a coefficient whose interval it rules.

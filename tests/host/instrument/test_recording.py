@@ -16,10 +16,8 @@ from host.physical.recording import SURFACES, Recording
 from host.readers.even_grid import even_columns
 from host.readers.recorded import recording_of_table
 from host.resources import resource
-from host.sysid.coefficients.coefficient_estimator import identify_coefficients
-from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.compatibility.servo_response import servo_response, surface_positions
-from host.sysid.flight.linear_estimator import identify
+from host.sysid.pipeline import aircraft_data, at_hand, identify_columns
 from host.twin.faults import Fault
 from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight
@@ -47,25 +45,22 @@ def measured(flown: VirtualFlight) -> dict[str, Array]:
 
 @pytest.fixture(scope="module")
 def commanded(flown: VirtualFlight) -> dict[str, Array]:
-    """The same flight had there been no pot: commands, behind the servos of the aircraft file."""
+    """The same flight had there been no pot: commands, which the door puts behind servos."""
     there = {f"{s}_rad": flown.table[f"{s}_command_rad"] for s in SURFACES}
-    columns = even_columns(flown.table.assign(**there))[0]
-    return surface_positions(columns, sensor_error_model(NAME).recorded(COMMANDED))
+    return even_columns(flown.table.assign(**there))[0]
 
 
 def answers(columns: dict[str, Array], instrument: SensorErrorModel) -> Intervals:
     """Return value and half-width of both answers, the linear one by the quickest method."""
-    airframe = airframe_data(NAME)
-    direct = identify_coefficients(columns, NAME, instrument=instrument)
-    found = {f"{d.name} direct": (d.value, d.half_width) for d in direct.fit.derivatives}
-    agreement = reconstruct(columns, airframe, instrument)
-    for answer in identify(
-        dict(columns),
-        airframe=airframe,
-        compatibility=agreement,
-        method="output-error-white",
-    ):
-        found |= {f"{c.name} linear": (c.value, c.half_width) for c in answer.coefficients}
+    known = replace(aircraft_data(NAME), instrument=instrument)
+    # Servos as open as the file leaves them: the fit would estimate their delay.
+    flight = at_hand(columns, aircraft=known, recording=instrument.recording, delays=False)
+    models = ("coefficients", "longitudinal", "lateral")
+    answer = identify_columns(flight, models=models, methods="output-error-white")
+    assert answer.coefficients is not None
+    found = {f"{c.name} direct": (c.value, c.half_width) for c in answer.coefficients.coefficients}
+    for one in answer.linear:
+        found |= {f"{c.name} linear": (c.value, c.half_width) for c in one.coefficients}
     return found
 
 

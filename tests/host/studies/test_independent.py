@@ -9,7 +9,6 @@ from host.instrument.deviations import sensor_error_model
 from host.physical.calibration import load_calibration
 from host.sysid.answer.trust_rules import doubts_of
 from host.sysid.compatibility.path_preparation import density_share
-from host.sysid.flight.linear_estimator import identify
 from studies import independent
 from studies.foreign.aeroplane import DENSITY_KGPM3, TRAINER, motion
 from studies.foreign.flight import COLUMNS, SPEED_MPS, STEP_S, Air, derivatives, fly
@@ -20,6 +19,8 @@ from studies.foreign.instrument import (
     drawn_file,
     with_sensor_errors,
 )
+
+from tests.host.sysid.at_hand import identify
 
 
 @pytest.mark.parametrize("form", ["dryden", "karman"])

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 from host.readers.even_grid import even_columns
-from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import free_model
 from host.thesis.hopfield import free_run
@@ -13,6 +12,8 @@ from host.twin.virtual import VirtualFlight, virtual_flight
 from studies.coefficients import CoefficientTally, true_delays, truths
 from studies.flights import PRINCIPAL
 from studies.thesis_flights import CASES, lines, nrmse, re_enact
+
+from tests.host.sysid.at_hand import identify_coefficients
 
 pytestmark = pytest.mark.usefixtures("machine_code")
 

@@ -15,11 +15,12 @@ from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
 from host.sysid.compatibility.position_correction import transfer_to_cg
 from host.sysid.flight.flight_tables import read_columns
-from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_detection import detect_maneuvers, grade
 from host.sysid.models.model_file import read_model
 from host.sysid.models.templates import Trim, longitudinal
 from host.sysid.numerics.output_error_problem import OutputProblem
+
+from tests.host.sysid.at_hand import identify
 
 
 @pytest.fixture(scope="module")

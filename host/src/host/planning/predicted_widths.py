@@ -15,8 +15,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from host.aircraft.mass_properties import airframe_data
-from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.constants import NORMAL_95
 from host.errors import IdentificationError
@@ -27,9 +25,8 @@ from host.readers.recorded import recording_of_table
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
 from host.sysid.coefficients.coefficient_intervals import CoefficientIntervals
-from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.linear_estimator import identify
+from host.sysid.pipeline import identify
 from host.twin.testcard.cards import Card
 from host.twin.virtual import virtual_flight
 
@@ -175,14 +172,7 @@ def linear_widths(table: pd.DataFrame, aircraft: str) -> dict[str, FlightWidth]:
     IdentificationError
         It tells nothing.
     """
-    columns, instrument = flown_columns(table, aircraft)
-    airframe = airframe_data(aircraft)
-    answers = identify(
-        columns,
-        airframe=airframe,
-        compatibility=reconstruct(columns, airframe, instrument),
-        powerplant=powerplant(aircraft),
-    )
+    answers = identify(table, aircraft=aircraft).linear
     return {name: row for answer in answers for name, row in _rows(answer).items()}
 
 

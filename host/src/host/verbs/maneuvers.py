@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     from host.sysid.answer.json_document import json_text, maneuver_document
     from host.sysid.answer.maneuver_list import maneuver_lines
     from host.sysid.flight.flight_tables import read_columns
-    from host.sysid.flight.linear_estimator import maneuvers_of
+    from host.sysid.flight.maneuver_detection import detect_maneuvers, grade
     from host.sysid.pipeline.arguments import option_words
 
     if str(args.map) == LIST:
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
                                       row_rate_hz=args.row_rate)  # fmt: skip
     except IdentificationError as error:
         raise IdentificationError(option_words(str(error))) from error
-    graded = maneuvers_of(columns)
+    graded = [(item, grade(columns, item)) for item in detect_maneuvers(columns)]
     if args.json:
         print(json_text({"notes": notes, "maneuvers": maneuver_document(graded)}))
     else:

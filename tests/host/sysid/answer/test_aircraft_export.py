@@ -23,12 +23,12 @@ from host.readers.even_grid import even_columns
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.answer.aircraft_export import AXES, CONTROLS, aircraft_document
 from host.sysid.answer.truth_comparison import read_truth, true_coefficients
-from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.coefficients.coefficient_fit import MeanCondition, ThrustEffect
 from host.sysid.flight.flight_tables import read_columns
-from host.sysid.flight.linear_estimator import identify
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
+
+from tests.host.sysid.at_hand import identify, identify_coefficients
 
 JSBSIM = """
 import sys, jsbsim

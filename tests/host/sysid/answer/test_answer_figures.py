@@ -20,7 +20,8 @@ from host.sysid.answer.figure_kinds import (
     spectra,
 )
 from host.sysid.flight.flight_tables import read_columns
-from host.sysid.flight.linear_estimator import identify
+
+from tests.host.sysid.at_hand import identify
 
 
 @pytest.fixture(scope="module")

@@ -16,8 +16,9 @@ from host.sysid.answer.output_files import OutputPaths, check_outputs
 from host.sysid.answer.simulators.forms import write_form
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.linear_estimator import identify
 from scipy import io
+
+from tests.host.sysid.at_hand import identify
 
 
 @pytest.fixture(scope="module")

@@ -14,9 +14,10 @@ from host.sysid.answer.marks import CAREFUL, MARKS, SMALL, TRUSTED, UNSURE
 from host.sysid.answer.short_answer import short_table
 from host.sysid.answer.trust_rules import NO_EVIDENCE
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.linear_estimator import identify
 from host.sysid.pipeline.estimate_table import estimate_table
 from studies.wrong_flights import fly
+
+from tests.host.sysid.at_hand import identify
 
 WIDTHS = (0.0, 0.05, 0.0999, 0.1001, 0.3, 0.31, 2.0)
 

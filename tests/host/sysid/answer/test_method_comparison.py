@@ -10,9 +10,10 @@ from host.sysid.answer.verdict import verdict_lines
 from host.sysid.estimators.method_registry import methods
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.linear_model import STAGED
 from host.sysid.flight.maneuver_selection import select_maneuvers
+
+from tests.host.sysid.at_hand import identify
 
 SLOW = {"hopfield-line-search", "genetic", "unscented-kalman", "filter-error"}
 

@@ -12,10 +12,11 @@ from host.sysid.answer.verdict import verdict_lines, verdict_of
 from host.sysid.estimators.servo_parameters import SERVO, ServoEstimate, ServoNumber
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.prediction_limits import Prediction
 from host.sysid.models.templates import Trim, template
 from studies.wrong_flights import LinearFlight, fly
+
+from tests.host.sysid.at_hand import identify
 
 RELIED_ON = (TRUSTED, CAREFUL)
 METHOD = "output-error"

@@ -14,7 +14,6 @@ from host.sysid.answer.figure_kinds import Bar, interval_bars, save
 from host.sysid.answer.truth_comparison import read_truth, true_coefficients
 from host.sysid.coefficients.coefficient_estimator import (
     CoefficientAnswer,
-    identify_coefficients,
     merged_windows,
 )
 from host.sysid.coefficients.coefficient_modes import coefficient_modes, quantities
@@ -23,6 +22,8 @@ from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.pipeline.identification import Identification
 from host.sysid.pipeline.stages import identify
 from scipy import io
+
+from tests.host.sysid.at_hand import identify_coefficients
 
 NAME = "ultrastick25e"
 RED = "#d62728"

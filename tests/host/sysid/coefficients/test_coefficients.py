@@ -12,7 +12,6 @@ from host.constants import NORMAL_95
 from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, deviations, sensor_error_model
 from host.readers.even_grid import even_columns
-from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
 from host.sysid.coefficients.coefficient_search import fit_coefficients, search_coefficients
 from host.sysid.coefficients.window_spectra import Window, window_transform
@@ -21,6 +20,8 @@ from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight
 from studies.flights import PRINCIPAL, Tally
+
+from tests.host.sysid.at_hand import identify_coefficients
 
 NAME = "ultrastick25e"
 # What an instrument without drawn errors leaves; arms and tilts of the real one are not in it.

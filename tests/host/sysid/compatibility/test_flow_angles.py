@@ -11,8 +11,9 @@ from host.errors import IdentificationError
 from host.sysid.compatibility.flow_angles import FlowAngles, flying, reconstruct_flow_angles
 from host.sysid.compatibility.linear_smoother import Step, smooth
 from host.sysid.compatibility.reconstruction import Compatibility
-from host.sysid.pipeline.aircraft_data import aircraft_data
-from host.sysid.pipeline.flight_preparation import PreparedFlight, prepare
+from host.sysid.pipeline import prepare, read_flight
+from host.sysid.pipeline.flight_preparation import PreparedFlight
+from host.sysid.pipeline.known_aircraft import aircraft_data
 from host.sysid.pipeline.reading_options import ReadingOptions
 from host.twin.flight.fly import fly
 from host.twin.outcome.autopilot_logs import write_autopilot_log
@@ -63,7 +64,7 @@ def test_smoother_is_least_squares() -> None:
 @pytest.fixture(scope="module")
 def prepared(tmp_path_factory: pytest.TempPathFactory) -> PreparedFlight:
     path = write("ulog", tmp_path_factory.mktemp("angles"))
-    return prepare(path, ReadingOptions(), aircraft_data(AIRCRAFT))
+    return prepare(read_flight(path, ReadingOptions(), aircraft_data(AIRCRAFT)))
 
 
 def _errors_deg(found: FlowAngles, t: np.ndarray) -> dict[str, np.ndarray]:
@@ -95,7 +96,9 @@ def test_angles_are_those_of_the_air(prepared: PreparedFlight) -> None:
 
 def test_the_path_of_a_short_flight_is_found(tmp_path: Path) -> None:
     """At 50 Hz and without turns full steps go round about the bank and never end."""
-    found = prepare(write("dataflash", tmp_path), ReadingOptions(), aircraft_data(AIRCRAFT))
+    found = prepare(
+        read_flight(write("dataflash", tmp_path), ReadingOptions(), aircraft_data(AIRCRAFT))
+    )
     assert found.agreement is not None
     assert found.flight.angles is not None
     errors = _errors_deg(found.flight.angles, found.flight.corrected["t_s"])
@@ -110,7 +113,7 @@ def test_a_tilted_imu_costs_no_path(tmp_path: Path) -> None:
     record = fly(card, seed=11789, errors=of_an_autopilot())
     stem = tmp_path / "flight"
     path = write_autopilot_log("ulog", record, air_data(record), stem, airframe="conventional")
-    found = prepare(path, ReadingOptions(), aircraft_data(AIRCRAFT))
+    found = prepare(read_flight(path, ReadingOptions(), aircraft_data(AIRCRAFT)))
     assert [f.check for f in found.findings] == ["flow-angles"]
     assert found.flight.angles is not None
 

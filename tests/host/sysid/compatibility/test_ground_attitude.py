@@ -20,8 +20,9 @@ from host.sysid.compatibility.ground_attitude import (
     update_by_standstill,
 )
 from host.sysid.compatibility.reconstruction import Compatibility, SensorErrorEstimate
-from host.sysid.pipeline.aircraft_data import aircraft_data
-from host.sysid.pipeline.flight_preparation import PreparedFlight, prepare
+from host.sysid.pipeline import prepare, read_flight
+from host.sysid.pipeline.flight_preparation import PreparedFlight
+from host.sysid.pipeline.known_aircraft import aircraft_data
 from host.sysid.pipeline.reading_options import ReadingOptions
 from host.twin.flight.fly import fly
 from host.twin.outcome.autopilot_logs import write_autopilot_log
@@ -129,8 +130,8 @@ def test_alpha_of_a_flight_loses_the_tilt(tmp_path: Path) -> None:
     tilt = float(record.draws.vector("misalignment_rad")[1])
     stands = float(true["theta_rad"].iloc[50])
     airframe = replace(known.airframe, ground_pitch_rad=stands, ground_pitch_sd_rad=0.004)
-    before = _mean_error(prepare(path, ReadingOptions(), known), true)
-    prepared = prepare(path, ReadingOptions(), replace(known, airframe=airframe))
+    before = _mean_error(prepare(read_flight(path, ReadingOptions(), known)), true)
+    prepared = prepare(read_flight(path, ReadingOptions(), replace(known, airframe=airframe)))
     assert before > 0.6 * tilt
     assert abs(_mean_error(prepared, true)) < 0.5 * before
     assert prepared.flight.angles is not None

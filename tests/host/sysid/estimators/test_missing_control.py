@@ -9,9 +9,10 @@ from host.physical.recording import FOREIGN
 from host.sysid.answer.marks import TRUSTED
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.linear_estimator import identify
 from studies import wrong_flights
 from studies.wrong_flights import LinearFlight
+
+from tests.host.sysid.at_hand import identify
 
 SEEDS = range(12150, 12153)
 

@@ -10,8 +10,9 @@ from host.physical.recording import AUTOPILOT, FOREIGN, OWN
 from host.sysid.answer.marks import TRUSTED
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.linear_estimator import identify
 from studies.wrong_flights import TRUTH, fly
+
+from tests.host.sysid.at_hand import identify
 
 SEEDS = (14790, 14791)
 

@@ -8,9 +8,10 @@ from host.aircraft.mass_properties import AirframeData
 from host.constants import GRAVITY_MPS2
 from host.sysid.aerodynamics.thrust_terms import LEAST_SHARE, THRUST_BESIDE, with_thrust
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.models.templates import Trim
+
+from tests.host.sysid.at_hand import identify
 
 Columns = dict[str, np.ndarray]
 MASS_KG, AREA_M2, CHORD_M, IYY_KGM2, ARM_M = 7500.0, 30.0, 2.4, 56e3, 0.5

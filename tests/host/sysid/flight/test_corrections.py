@@ -37,7 +37,6 @@ from host.sysid.compatibility.sensor_corrections import (
 )
 from host.sysid.flight import linear_answer, linear_model
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.sampling_error import HOLD
 from host.sysid.flight.systematic_errors import add_systematic_covariance, systematic_error_shifts
 from host.sysid.models.residual_delays import STANDARD_DELAYS
@@ -47,6 +46,7 @@ from host.sysid.pipeline import flight_preparation
 
 import host
 from tests.host.sysid import recorded
+from tests.host.sysid.at_hand import identify
 from tests.host.sysid.recorded import NAME, Columns
 
 

@@ -19,13 +19,13 @@ from host.sysid.flight.data_finding import Feedback, Finding
 from host.sysid.flight.feedback_findings import feedback_findings
 from host.sysid.flight.flight_tables import read_flight_columns
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_detection import detect_maneuvers
 from host.sysid.flight.maneuver_selection import select_maneuvers
 from host.sysid.models.state_space_model import Term
 from studies.wrong_flights import fly
 
 from tests.host.logs import ROOT
+from tests.host.sysid.at_hand import identify
 from tests.host.sysid.closed_loop import DT_S, Law, doublets, flown, tracked
 
 SAMPLES = 1600

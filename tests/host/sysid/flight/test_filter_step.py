@@ -7,12 +7,13 @@ from host.physical.recording import AUTOPILOT, FOREIGN, OWN
 from host.readers.column_sampling import sampled_name
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.flight.filter_step import with_filter_step
-from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.linear_model import model_and_method
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.flight.reconstructed_flight import FlownManeuver, ReconstructedFlight
 from host.sysid.models.templates import Trim, template
 from studies.wrong_flights import fly
+
+from tests.host.sysid.at_hand import identify
 
 NAMES = (
     "airspeed_mps", "alpha_rad", "q_radps", "theta_rad", "ax_mps2", "az_mps2", "elevator_rad",

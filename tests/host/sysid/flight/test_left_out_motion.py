@@ -7,12 +7,13 @@ import pytest
 from host.arrays import Array
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.models.templates import Trim, template
 from scipy import signal
 from studies import short_records
 from studies.wrong_flights import NOISE_SD, TRUTH
+
+from tests.host.sysid.at_hand import identify
 
 DT_S = 0.02
 TRIM = Trim(17.0, 0.06, 0.06)

@@ -7,8 +7,9 @@ import pandas as pd
 import pytest
 from host.sysid.answer.verdict import verdict_lines
 from host.sysid.flight.flight_tables import read_columns
-from host.sysid.flight.linear_estimator import identify
 from scipy.signal import lsim
+
+from tests.host.sysid.at_hand import identify
 
 
 @pytest.mark.parametrize("method", ["flight", "output-error", "stepwise"])

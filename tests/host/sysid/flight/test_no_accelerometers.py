@@ -8,8 +8,9 @@ import pytest
 from host.instrument.instrument_errors import usual_errors
 from host.physical.recording import FOREIGN
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.linear_estimator import identify
 from studies.foreign.flight import Air, derivatives, fly
+
+from tests.host.sysid.at_hand import identify
 
 FORCES = ("ax_mps2", "ay_mps2", "az_mps2")
 LATE_S = 0.02

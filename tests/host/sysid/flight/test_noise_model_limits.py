@@ -10,7 +10,6 @@ from host.sysid.answer.verdict import verdict_of
 from host.sysid.estimators.method_registry import fit
 from host.sysid.flight.free_simulation import free_responses
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.noise_model_limits import random_errors
 from host.sysid.flight.prediction_limits import power_freedom, predictions, random_noise
 from host.sysid.models.maneuver import Maneuver
@@ -22,6 +21,7 @@ from studies.independent import cells, flown
 from studies.wrong_flights import fly
 
 import host
+from tests.host.sysid.at_hand import identify
 
 WORDS = "more than the fit's own gusts and noise allow"
 

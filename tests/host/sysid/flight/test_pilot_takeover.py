@@ -5,11 +5,12 @@ from host.arrays import Array
 from host.instrument.instrument_errors import usual_errors
 from host.physical.recording import FOREIGN
 from host.sysid.flight import linear_intervals
-from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_detection import detect_maneuvers
 from host.sysid.flight.pilot_takeover import taken_over
 from studies import independent
 from studies.foreign.flight import INPUTS
+
+from tests.host.sysid.at_hand import identify
 
 ROLLING = independent.cells()["dryden, fixed, spread, 1 m/s"]
 

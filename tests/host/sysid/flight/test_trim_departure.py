@@ -17,7 +17,6 @@ from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.start_values import regression_estimates, start_values
 from host.sysid.flight import gust_at_trim, linear_estimator
-from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.linear_model import imu_place_m, without_attitude
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.flight.reconstructed_flight import flown_maneuvers, reconstruct_flight
@@ -35,6 +34,7 @@ from studies.independent import cells
 from studies.linear import derivatives
 
 import host
+from tests.host.sysid.at_hand import identify
 
 NAME = "ultrastick25e"
 Columns = dict[str, np.ndarray]

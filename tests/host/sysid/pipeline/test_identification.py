@@ -22,7 +22,7 @@ from host.sysid.coefficients.coefficient_model import standard_model
 from host.sysid.flight import maneuver_detection, maneuver_selection
 from host.sysid.flight.linear_estimator import LinearEstimator
 from host.sysid.models.templates import Trim, template
-from host.sysid.pipeline.flight_preparation import prepare
+from host.sysid.pipeline import prepare, read_flight
 from host.sysid.pipeline.identification import Identification
 from host.sysid.pipeline.notebook_pictures import Pictures
 from host.sysid.pipeline.reading_options import ReadingOptions
@@ -236,8 +236,6 @@ def test_maneuvers_are_found_once_a_flight(
         return maneuver_detection.detect_maneuvers(columns)
 
     monkeypatch.setattr(maneuver_selection, "detect_maneuvers", counted)
-    monkeypatch.setattr("host.sysid.flight.linear_estimator.detect_maneuvers", counted)
-    monkeypatch.setattr("host.sysid.coefficients.coefficient_estimator.detect_maneuvers", counted)
     source = flights[0] / "flight.csv"
     methods = ("equation-error", "equation-error-robust")
     host.identify(source, aircraft=NAME, models=MODELS, methods=methods)
@@ -245,10 +243,10 @@ def test_maneuvers_are_found_once_a_flight(
 
 
 def test_a_stage_adds_and_changes_nothing_before_it(flights: tuple[Path, Path]) -> None:
-    from host.sysid.pipeline.aircraft_data import aircraft_data
+    from host.sysid.pipeline.known_aircraft import aircraft_data
 
     known = aircraft_data(NAME)
-    flight = prepare(flights[0] / "flight.csv", ReadingOptions(), known).flight
+    flight = prepare(read_flight(flights[0] / "flight.csv", ReadingOptions(), known)).flight
     estimator = LinearEstimator("lateral", airframe=known.airframe, powerplant=known.powerplant)
     estimate = estimator.estimate([flight])
     fit = estimate.fit

@@ -35,6 +35,11 @@ class Coefficient:
     half_width: float
     widened_by: str = ""
 
+    @property
+    def differs_from_zero(self) -> bool:
+        """Whether its interval does not reach zero."""
+        return abs(self.value) > self.half_width
+
 
 @dataclass(frozen=True, slots=True)
 class CoefficientTable:

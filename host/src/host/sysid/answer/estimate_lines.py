@@ -15,7 +15,6 @@ from host.sysid.answer.servo_lines import servo_estimate_lines
 from host.sysid.answer.settling_history import history_lines
 from host.sysid.answer.trust_rules import unpredicted_states
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.linear_estimator import from_zero
 from host.sysid.models.modal_analysis import Mode
 
 if TYPE_CHECKING:
@@ -53,7 +52,7 @@ def model_lines(answer: Answer) -> list[str]:
         )
         lines += [
             f"  {c.name:16s} {c.value:11.5g}  +- {c.half_width:9.3g}"
-            + ("" if from_zero(c) else "  not told from zero")
+            + ("" if c.differs_from_zero else "  not told from zero")
             for c in answer.coefficients
         ]
     lines += [*constant_lines(answer), *history_lines(answer), *mode_lines(answer)]

@@ -39,12 +39,10 @@ from host.sysid.coefficients.flight_terms import flight_terms
 from host.sysid.coefficients.hidden_lag import lagging_equations
 from host.sysid.coefficients.pooled_flights import pool_fits
 from host.sysid.coefficients.window_spectra import SHORTEST_S, ResidualSpectra, Window
-from host.sysid.flight.estimator import answer_of
-from host.sysid.flight.maneuver_detection import FLYING_SHARE, DetectedManeuver, detect_maneuvers
+from host.sysid.flight.maneuver_detection import FLYING_SHARE, DetectedManeuver
 from host.sysid.flight.reconstructed_flight import (
     ReconstructedFlight,
     maneuver_name,
-    reconstruct_flight,
 )
 from host.sysid.models.consider_covariance import dominant_error_source
 from host.sysid.models.modal_analysis import Mode
@@ -280,50 +278,13 @@ def coefficient_estimator(
     airframe: AirframeData | None = None,
     instrument: SensorErrorModel | None = None,
 ) -> CoefficientEstimator:
-    """Return the estimator of an aircraft by name or file; arguments of `identify_coefficients`."""
+    """Return the estimator of an aircraft by name or file."""
     airframe, data = airframe or airframe_data(aircraft), instrument or sensor_error_model(aircraft)
     try:
         plant = powerplant(aircraft)
     except NoPropulsionError:
         plant = without_propeller()
     return CoefficientEstimator(airframe, plant, data, model or standard_model())
-
-
-def identify_coefficients(
-    columns: Mapping[str, Array],
-    aircraft: str,
-    *,
-    windows: Sequence[DetectedManeuver] | None = None,
-    model: CoefficientModel | None = None,
-    airframe: AirframeData | None = None,
-    instrument: SensorErrorModel | None = None,
-) -> CoefficientAnswer:
-    """Find the maneuvers of a flight and fit coefficients to all of them jointly.
-
-    Parameters
-    ----------
-    columns : mapping
-        SI columns on an even grid, as `host.sysid.flight.flight_tables` returns them.
-    aircraft : str
-        Name or path of the aircraft file.
-    windows : sequence of Found, optional
-        Use these instead of finding them.
-    model : CoefficientModel, optional
-        The terms of every coefficient; `standard_model` by default.
-    airframe : AirframeData, optional
-        Instead of that of the aircraft file.
-    instrument : SensorErrorModel, optional
-        Standard deviations of the sensor errors, from `sensor_error_model`; the standard ones
-        without.
-
-    Raises
-    ------
-    IdentificationError
-        If a column or an axis is missing, or the aircraft file lacks what is needed.
-    """
-    by = coefficient_estimator(aircraft, model=model, airframe=airframe, instrument=instrument)
-    found = detect_maneuvers(columns) if windows is None else windows
-    return answer_of(by, [reconstruct_flight(columns, found)])
 
 
 def merged_windows(found: Sequence[DetectedManeuver]) -> list[Window]:

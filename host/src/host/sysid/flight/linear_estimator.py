@@ -1,7 +1,6 @@
 """Linear models of a flight: estimation, intervals, validation, each a stage that adds its part.
 
-A stage hands on what it made; none changes what an earlier one said. `LinearEstimator` is what the
-pipeline runs, `identify` the same for columns that are at hand.
+A stage hands on what it made; none changes what an earlier one said.
 """
 
 from __future__ import annotations
@@ -14,16 +13,11 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
-from host.errors import IdentificationError
-from host.instrument.instrument_errors import InstrumentErrors
-from host.physical.recording import OWN
 from host.sysid.aerodynamics.coefficient_table import (
-    Coefficient,
     coefficients,
     trim_of,
 )
 from host.sysid.aerodynamics.thrust_terms import THRUST_BESIDE, with_thrust
-from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_corrections import corrections
 from host.sysid.estimators.filter_error_gust import without_gust_parameters
 from host.sysid.estimators.gust_model import VANES
@@ -31,11 +25,9 @@ from host.sysid.estimators.gust_penetration import without_gust_penetration
 from host.sysid.estimators.method_registry import fit, refuse_unless_finite
 from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
 from host.sysid.flight.commanded_surfaces import brought_behind, servo_of
-from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.filter_step import with_filter_step
 from host.sysid.flight.first_departures import first_departures, remove_departures
 from host.sysid.flight.fitted_maneuvers import (
-    NoManeuverError,
     columns_of,
     fitted_and_held_out,
 )
@@ -52,12 +44,10 @@ from host.sysid.flight.linear_model import (
 )
 from host.sysid.flight.linear_stages import LinearEstimate, LinearIntervals, LinearValidation
 from host.sysid.flight.linear_validation import linear_validation
-from host.sysid.flight.maneuver_detection import DetectedManeuver, Grade, detect_maneuvers, grade
 from host.sysid.flight.maneuver_selection import excited_axes
 from host.sysid.flight.reconstructed_flight import (
     FlownManeuver,
     ReconstructedFlight,
-    reconstruct_flight,
 )
 from host.sysid.flight.surface_motion import (
     HELD,
@@ -287,84 +277,3 @@ class LinearEstimator:
             standard_delays=standard_delays(e.used),
             causes=widest_errors(e.fit, intervals.statistical, intervals.total, intervals.shifts),
         )
-
-
-def maneuvers_of(columns: Mapping[str, Array]) -> list[tuple[DetectedManeuver, Grade]]:
-    """Return the maneuvers of a flight with their grades."""
-    return [(item, grade(columns, item)) for item in detect_maneuvers(columns)]
-
-
-def identify(
-    columns: dict[str, Array],
-    *,
-    names: Sequence[str] = ("longitudinal", "lateral"),
-    method: str = DEFAULT_METHOD,
-    airframe: AirframeData | None = None,
-    windows: Sequence[DetectedManeuver] | None = None,
-    user_model: LinearModel | None = None,
-    with_delays: bool = True,
-    compatibility: Compatibility | None = None,
-    powerplant: Powerplant | None = None,
-    maker: str = OWN,
-    errors: InstrumentErrors | None = None,
-) -> list[Answer]:
-    """Fit every model that has maneuvers to the columns of one flight.
-
-    Parameters
-    ----------
-    columns : dict
-        SI columns on an even grid.
-    names : sequence of str
-        Templates to fit.
-    method : str
-        A method of `fit`.
-    airframe : AirframeData, optional
-        Gives sensor corrections and coefficients.
-    windows : sequence of Found, optional
-        Use these instead of finding them.
-    user_model : LinearModel, optional
-        Fit this instead of templates, to every window where one of its inputs moved.
-    with_delays : bool
-        Estimate residual delays and accelerometer offsets where the method can.
-    compatibility : Compatibility, optional
-        What reconstruction found: told errors are taken out of the columns, and what stays open
-        of all errors is carried into the intervals.
-    powerplant : Powerplant, optional
-        Gives the rotor's spin.
-    maker : str
-        Who recorded the columns, as `Recording.maker`: lateral motion of others' tables is fitted
-        with rolling gusts by default, of ours only where an aircraft file is known.
-    errors : InstrumentErrors, optional
-        Of the sensors, without an aircraft file; otherwise what is usual of the maker's.
-
-    Raises
-    ------
-    IdentificationError
-        If no maneuver is there for any model.
-    """
-    strangers = [n for n in names if user_model is None and n not in AXIS_OF]
-    if strangers:
-        raise IdentificationError(
-            f"no template '{strangers[0]}'; there are {', '.join(AXIS_OF)}, or give a TOML file"
-        )
-    found = detect_maneuvers(columns) if windows is None else windows
-    flight = reconstruct_flight(
-        columns, found, airframe=airframe, compatibility=compatibility, maker=maker
-    )
-    flight = replace(flight, delays_open=flight.delays_open and with_delays, errors=errors)
-    answers: list[Answer] = []
-    failed: list[str] = []
-    for name in names:
-        estimator = LinearEstimator(name, user_model, method, airframe, powerplant)
-        try:
-            answers.append(answer_of(estimator, [flight]))
-        except NoManeuverError as error:
-            failed.append(str(error))
-    if not answers:
-        raise NoManeuverError("; ".join(dict.fromkeys(failed)))
-    return answers
-
-
-def from_zero(coefficient: Coefficient) -> bool:
-    """Return whether a coefficient is told from zero: its interval does not reach it."""
-    return abs(coefficient.value) > coefficient.half_width

@@ -1,12 +1,9 @@
-"""The first stages, one flight at a time: reading, maneuvers, reconstruction."""
+"""The first stages, one flight at a time: maneuvers, checks, reconstruction."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,21 +26,13 @@ from host.sysid.flight.agreement_findings import calibration_findings, disagreem
 from host.sysid.flight.airspeed_scale import airspeed_scale_findings
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.feedback_findings import feedback_findings
-from host.sysid.flight.flight_tables import read_flight_columns, source_name
 from host.sysid.flight.hidden_angles import no_instrument_errors_finding, no_vanes_finding
+from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.flight.maneuver_selection import overlap_notes, select_maneuvers
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight, reconstruct_flight
 from host.sysid.flight.small_inputs import whole_flight
-from host.sysid.pipeline.aircraft_data import AircraftData
-from host.sysid.pipeline.reading_options import ReadingOptions
+from host.sysid.pipeline.flight_at_hand import FlightAtHand
 from host.sysid.pipeline.surface_travel import with_surface_angles
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from host.log import FlightLog
-
-    Source = str | Path | FlightLog | pd.DataFrame
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,34 +50,31 @@ class PreparedFlight:
         return self.flight.findings
 
 
-def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> PreparedFlight:
-    """Read a flight, find its maneuvers once, and reconstruct it.
+def prepare(given: FlightAtHand) -> PreparedFlight:
+    """Find the maneuvers of a flight once, and reconstruct it.
 
     Raises
     ------
     host.errors.HostError
-        If it cannot be read, or what was asked for is not in it.
+        If what was asked for is not in it.
     """
-    opened = Path(source) if isinstance(source, str) else source
-    read = read_flight_columns(
-        opened,
-        how.mapping,
-        calibration=how.calibration,
-        also=how.also,
-        accept=how.accept,
-        sensors=dict(how.sensors),
-        row_rate_hz=how.row_rate_hz,
-    )
+    read, how, known = given.read, given.how, given.known
     columns, travel = with_surface_angles(read.columns, read.shares, known)
     notes, findings = [*read.notes, *travel], [*read.findings]
     instrument = known.flown(read) if known else None
     better = load_calibration(how.calibration) if how.calibration is not None else None
     sensors = instrument or unknown_sensors(read.recording, better)
+    if given.errors is not None:
+        sensors = replace(sensors, errors=given.errors)
     commands = commands_of(columns, sensors)
     columns = surface_positions(columns, sensors)
     if instrument is not None or commands:
         notes += recording_notes(sensors)
-    found = select_maneuvers(columns, stretches=how.stretches, numbers=how.maneuvers)
+    found: Sequence[DetectedManeuver]
+    if given.windows is None:
+        found = select_maneuvers(columns, stretches=how.stretches, numbers=how.maneuvers)
+    else:
+        found = given.windows
     notes += overlap_notes(how.stretches)
     if not found:
         found, small = whole_flight(columns)
@@ -116,7 +102,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
     flight = reconstruct_flight(
         columns,
         found,
-        source=source_name(source),
+        source=given.source,
         airframe=known.airframe if known else None,
         # Without sensor positions a vane ahead of the CG looks like a delayed one.
         compatibility=agreement if known is not None and how.corrections else None,
@@ -145,34 +131,6 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         calibration_alone=calibration_alone,
     )
     return PreparedFlight(flight, agreement, tuple(notes), unchecked)
-
-
-def listed_flights(flights: Source | Sequence[Source]) -> list[Source]:
-    """Return the flights as a list; a path, a log or a table is one flight.
-
-    Raises
-    ------
-    IdentificationError
-        If there is none, or one is something else.
-    """
-    from host.log import FlightLog
-
-    listed: list[Any] = list(flights) if isinstance(flights, list | tuple) else [flights]
-    if not listed:
-        raise IdentificationError("no flight given; name a log, a table, or several")
-    for number, one in enumerate(listed, start=1):
-        if not isinstance(one, str | Path | FlightLog) and not _is_table(one):
-            raise IdentificationError(
-                f"flight {number} is of type {type(one).__name__}, expected a path, what"
-                " host.read_log returns, or a table (DataFrame)"
-            )
-    return listed
-
-
-def _is_table(one: object) -> bool:
-    """Return whether it is a DataFrame: who has one has loaded pandas, a log needs none (0.5 s)."""
-    pandas = sys.modules.get("pandas")
-    return pandas is not None and isinstance(one, pandas.DataFrame)
 
 
 def distinct_flights(flights: Sequence[ReconstructedFlight]) -> list[ReconstructedFlight]:

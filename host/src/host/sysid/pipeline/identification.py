@@ -28,10 +28,11 @@ from host.sysid.compatibility.reconstruction import (
 from host.sysid.flight.data_finding import Finding, finding_document
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
-from host.sysid.pipeline.aircraft_data import AircraftData
 from host.sysid.pipeline.arguments import chosen_stretches, numbers_of, path_of
 from host.sysid.pipeline.estimate_table import estimate_table, mode_table
-from host.sysid.pipeline.flight_preparation import listed_flights, prepare
+from host.sysid.pipeline.flight_at_hand import listed_flights, read_flight
+from host.sysid.pipeline.flight_preparation import prepare
+from host.sysid.pipeline.known_aircraft import AircraftData
 from host.sysid.pipeline.notebook_html import answer_html
 from host.sysid.pipeline.notebook_pictures import Pictures
 from host.sysid.pipeline.reading_options import ReadingOptions
@@ -40,7 +41,7 @@ from host.sysid.pipeline.simulation import Simulation, identified_models, simula
 if TYPE_CHECKING:
     import pandas as pd
 
-    from host.sysid.pipeline.flight_preparation import Source
+    from host.sysid.pipeline.flight_at_hand import Source
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +168,7 @@ class Identification:
             stretches=chosen_stretches(stretches, from_s, to_s, 1)[0],
         )
         [source] = listed_flights([flight])
-        found = prepare(source, how, self.aircraft)
+        found = prepare(read_flight(source, how, self.aircraft))
         models = identified_models(self.linear, self.coefficients)
         notes = (*found.notes, *found.unchecked)
         return simulate(models, found.flight, notes, constants=constants)

@@ -25,12 +25,13 @@ from host.sysid.models.thrust_column import (
     read_thrust_column,
 )
 from host.sysid.models.toml_document import read_document
-from host.sysid.pipeline.aircraft_data import aircraft_data
 from host.sysid.pipeline.aircraft_motion import aircraft_models
 from host.sysid.pipeline.arguments import (
     path_of,
 )
-from host.sysid.pipeline.flight_preparation import listed_flights, prepare
+from host.sysid.pipeline.flight_at_hand import listed_flights, read_flight
+from host.sysid.pipeline.flight_preparation import prepare
+from host.sysid.pipeline.known_aircraft import aircraft_data
 from host.sysid.pipeline.notebook_pictures import Pictures
 from host.sysid.pipeline.prediction_text import simulation_document, simulation_lines
 from host.sysid.pipeline.reading_options import OfEach, joined_stretches, reading_options
@@ -41,7 +42,7 @@ THRUST_HELD = "the model was fitted with thrust that changed; none is measured h
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from host.sysid.pipeline.flight_preparation import Source
+    from host.sysid.pipeline.flight_at_hand import Source
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +153,7 @@ def predict(
     found = []
     for source, how in zip([sources[number] for number in kept], each, strict=True):
         known = aircraft_data(aircraft, how.calibration) if aircraft is not None else None
-        ready = prepare(source, how, known)
+        ready = prepare(read_flight(source, how, known))
         notes = (
             *(finding.line for finding in ready.flight.findings),
             *ready.notes,

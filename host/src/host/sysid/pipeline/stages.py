@@ -6,31 +6,32 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from host.aircraft.powerplant import without_propeller
 from host.aircraft.prior.prior_file import read_prior
 from host.aircraft.prior.prior_table import PriorTable
 from host.errors import IdentificationError
 from host.progress import stage
 from host.sysid.answer.truth_comparison import read_truth
-from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, coefficient_estimator
+from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, CoefficientEstimator
 from host.sysid.estimators.method_options import check_options, options_of
 from host.sysid.flight.data_finding import accepted_in_vain
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import LinearEstimator
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
-from host.sysid.pipeline.aircraft_data import AircraftData, aircraft_data
 from host.sysid.pipeline.arguments import (
     path_of,
     paths_of,
 )
+from host.sysid.pipeline.flight_at_hand import FlightAtHand, listed_flights, read_flight
 from host.sysid.pipeline.flight_preparation import (
     collected_findings,
     collected_notes,
     distinct_flights,
-    listed_flights,
     prepare,
 )
 from host.sysid.pipeline.identification import Identification
+from host.sysid.pipeline.known_aircraft import AircraftData, aircraft_data
 from host.sysid.pipeline.reading_options import OfEach, joined_stretches, reading_options
 from host.sysid.pipeline.requested_models import (
     ModelName,
@@ -41,7 +42,7 @@ from host.sysid.pipeline.requested_models import (
 )
 
 if TYPE_CHECKING:
-    from host.sysid.pipeline.flight_preparation import Source
+    from host.sysid.pipeline.flight_at_hand import Source
 
 
 def identify(
@@ -138,22 +139,59 @@ def identify(
     kept, each = joined_stretches(sources, each)
     true_files = _truth_files(truth, len(sources), kept)
     sources = [sources[number] for number in kept]
-    calibrations = [how.calibration for how in each]
-    by_calibration = {
+    true = _truth(true_files, len(sources))
+    known = {
         made_by: aircraft_data(aircraft, made_by) if aircraft is not None else None
-        for made_by in calibrations
+        for made_by in dict.fromkeys(how.calibration for how in each)
     }
-    known = by_calibration[calibrations[0]]
     stage("reconstructing the flight")
-    ready = [
-        prepare(source, how, by_calibration[how.calibration])
-        for source, how in zip(sources, each, strict=True)
-    ]
+    return identify_columns(
+        [
+            read_flight(source, how, known[how.calibration])
+            for source, how in zip(sources, each, strict=True)
+        ],
+        models=asked,
+        methods=by,
+        truth=true,
+        prior=prior,
+        method_options=options,
+    )
+
+
+def identify_columns(
+    flights: FlightAtHand | Sequence[FlightAtHand],
+    *,
+    models: Models | ModelName | Iterable[ModelName] | None = None,
+    methods: str | Iterable[str] | None = None,
+    truth: dict[str, Any] | None = None,
+    prior: str | Path | None = None,
+    method_options: Mapping[str, object] | None = None,
+) -> Identification:
+    """Identify from columns that were read, or that a program has: what `host.identify` calls.
+
+    Parameters
+    ----------
+    flights : FlightAtHand or several
+        As `at_hand` or `read_flight` return them.
+    truth : dict, optional
+        Of simulated flights, as `host simulate` writes it.
+    models, methods, prior, method_options
+        As in `host.identify`.
+
+    Raises
+    ------
+    IdentificationError
+        If nothing can be identified, with every reason.
+    """
+    given = [flights] if isinstance(flights, FlightAtHand) else list(flights)
+    asked = models if isinstance(models, Models) else requested_models(models)
+    by, options = requested_methods(methods), dict(method_options or {})
+    known, how = given[0].known, given[0].how
+    ready = [prepare(flight) for flight in given]
     reading = known.doubts if known else ()
     findings = collected_findings(ready)
-    more = accepted_in_vain(each[0].accept, findings)
+    more = accepted_in_vain(how.accept, findings)
     recorded = distinct_flights([one.flight for one in ready])
-    true = _truth(true_files, len(recorded))
     expected = _prior(prior, recorded, known)
     asked, instead = possible_models(asked, [flight.recorded for flight in recorded])
     more += instead
@@ -169,9 +207,9 @@ def identify(
         coefficients=direct,
         notes=(*collected_notes(ready, reading), *more, *doubts, *unfit),
         methods=by,
-        reading=each[0],
+        reading=how,
         aircraft=known,
-        truth=true,
+        truth=truth,
         prior=expected,
         findings=findings,
     )
@@ -189,8 +227,11 @@ def _coefficients(
         )
     stage("coefficients")
     try:
-        by = coefficient_estimator(
-            known.source, model=asked.coefficients, instrument=known.instrument
+        by = CoefficientEstimator(
+            known.airframe,
+            known.powerplant or without_propeller(),
+            known.instrument,
+            asked.coefficients,
         )
         return answer_of(by, flights), []
     except IdentificationError as error:

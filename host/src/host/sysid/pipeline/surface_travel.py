@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from host.aircraft.file import load_measured
 from host.arrays import Array
-from host.sysid.pipeline.aircraft_data import AircraftData
+from host.sysid.pipeline.known_aircraft import AircraftData
 
 
 def with_surface_angles(
