@@ -20,7 +20,7 @@ from host.log import read_log
 from host.physical.calibration import calibration_of_text
 from host.planning.learning_card import NAMES, learned_axes
 from host.planning.logger_card import Envelope, logger_card
-from host.sysid.estimators.onboard_sums import AxisCard
+from host.planning.onboard_sums import AxisCard
 from host.twin.flight.fly import FlightRecord
 from host.twin.outcome import truth_files
 from host.twin.outcome.virtual_calibration import calibration

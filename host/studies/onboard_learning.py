@@ -27,8 +27,7 @@ from host.planning.learning_card import (
     LearningCondition,
     learning_card,
 )
-from host.sysid.estimators.onboard_equation_error import EquationError, Learned
-from host.sysid.estimators.onboard_sums import (
+from host.planning.onboard_sums import (
     PITCH,
     ROLL,
     SAMPLE_HZ,
@@ -47,6 +46,7 @@ from host.twin.sensors.local_flow import air_data
 from host.twin.testcard.cards import Card, Segment, load
 from numpy.typing import NDArray
 
+from studies.onboard_equation_error import EquationError, Learned
 from studies.stored_rows import flown_rows, seeded_run
 
 FIRST_SEED = 22_006  # 22000-22005 were looked at

@@ -1,6 +1,6 @@
 """Whole rows of virtual flights through the C++ on the simulated ATmega2560, bit for bit.
 
-    python -m tests.learning.flight_on_chip 22006 22007
+    PYTHONPATH=host python -m tests.learning.flight_on_chip 22006 22007
 
 Flies the study's card through the recorder, takes the rows of pitch, roll and yaw out of its log,
 lets the host answer every solve of them and the chip as well; flags are those of the Mega's image.
@@ -16,7 +16,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from host.sysid.estimators.onboard_sums import PITCH, ROLL, YAW
+from host.planning.onboard_sums import PITCH, ROLL, YAW
+from studies.onboard_learning import flown, learning_rows
 
 from tests.learning.shared_cases import Case, header
 
@@ -29,9 +30,6 @@ MOST_S = 300
 
 def cases_of(seed: int) -> list[Case]:
     """Return the rows of one flight."""
-    sys.path.insert(0, str(ROOT / "host"))
-    from studies.onboard_learning import flown, learning_rows
-
     rows = {row.name: row for row in learning_rows(flown(seed))}
     return [Case(axis.capitalize(), rows[n].card, rows[n].samples) for n, axis in ROWS.items()]
 

@@ -1,7 +1,8 @@
 """Cases that the logger's C++ and the host's Python must answer bit for bit.
 
-    python -m tests.learning.shared_cases    writes tests/firmware/test_learning/cases.h
+    PYTHONPATH=host python -m tests.learning.shared_cases
 
+writes tests/firmware/test_learning/cases.h.
 A small linear aircraft answers to square waves, its signals are rounded to counts; samples and
 slices of the solve alternate as they do in the logger. One case is of the largest numbers.
 """
@@ -14,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from host.sysid.estimators.onboard_equation_error import EquationError, Learned
-from host.sysid.estimators.onboard_sums import PITCH, ROLL, SAMPLE_HZ, YAW, AxisCard, FourierSums
+from host.planning.onboard_sums import PITCH, ROLL, SAMPLE_HZ, YAW, AxisCard, FourierSums
 from numpy.typing import NDArray
+from studies.onboard_equation_error import EquationError, Learned
 
 HEADER = Path(__file__).parents[1] / "firmware/test_learning/cases.h"
 SLICES_PER_SAMPLE = 23

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from host.sysid.estimators.onboard_sums import MOST_SAMPLES, AxisCard, FourierSums
+from host.planning.onboard_sums import MOST_SAMPLES, AxisCard, FourierSums
 
 from tests.learning.shared_cases import HEADER, Case, answer, every_case, header
 

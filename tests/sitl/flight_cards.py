@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from host.sysid.estimators.onboard_sums import PITCH, ROLL, YAW, AxisCard
+from host.planning.onboard_sums import PITCH, ROLL, YAW, AxisCard
 
 ROOT = Path(__file__).resolve().parents[2]
 VALID_AT, CARD_AT, VALID = 1024, 1040, 0xC5  # app/card_store.h

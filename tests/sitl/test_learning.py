@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 from host.planning.learning_card import SIX_HARMONICS, LearningCondition, learning_card
-from host.sysid.estimators.onboard_equation_error import EquationError, Learned
-from host.sysid.estimators.onboard_sums import PITCH, ROLL, SAMPLE_HZ, AxisCard, FourierSums
+from host.planning.onboard_sums import PITCH, ROLL, SAMPLE_HZ, AxisCard, FourierSums
 from host.twin.recorder.sitl_library import TICKS_PER_S, Level
 from host.wire.schema_text import packed_schema
 from numpy.typing import NDArray
+from studies.onboard_equation_error import EquationError, Learned
 
 from tests.sitl import flight_cards as cards
 from tests.sitl.bench import Bench

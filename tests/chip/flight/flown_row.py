@@ -10,7 +10,7 @@ from flight.rig import DIRECT_US, FlightRig, make_card
 from flight.servos import SERVOS, strange
 from flight.settings import reference_image
 from host.planning.learning_card import SIX_HARMONICS, LearningCondition, learning_card
-from host.sysid.estimators.onboard_sums import ROLL
+from host.planning.onboard_sums import ROLL
 from host.wire.framing import EnvelopeReader
 from host.wire.schema_text import packed_schema
 from numpy.typing import NDArray

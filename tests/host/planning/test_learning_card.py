@@ -21,12 +21,12 @@ from host.planning.learning_card import (
     learning_card,
 )
 from host.planning.logger_card import logger_card
-from host.sysid.estimators.onboard_equation_error import EquationError
-from host.sysid.estimators.onboard_sums import PITCH, SIGNALS, AxisCard, FourierSums
+from host.planning.onboard_sums import PITCH, SIGNALS, AxisCard, FourierSums
 from host.twin.testcard.cards import Card, Segment, Tone
 from host.wire.card_text import card_lines
 from host.wire.flight_card import read_card
 from numpy.typing import NDArray
+from studies.onboard_equation_error import EquationError
 
 AIRCRAFT, V, RHO = "ultrastick25e", 17.0, 1.225
 STEPS = 512  # one whole turn of every harmonic

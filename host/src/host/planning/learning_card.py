@@ -23,7 +23,7 @@ from host.constants import NORMAL_95
 from host.instrument.deviations import SensorErrorModel, deviations, sensor_error_model
 from host.physical.calibration import Calibration, load_calibration
 from host.physical.channels import constant_delay_us
-from host.sysid.estimators.onboard_sums import (
+from host.planning.onboard_sums import (
     PITCH,
     ROLL,
     SAMPLE_HZ,

@@ -19,7 +19,7 @@ from host.constants import GRAVITY_MPS2
 from host.errors import UsageError
 from host.physical.calibration import Calibration
 from host.planning.learning_card import TURNS, learning_parts
-from host.sysid.estimators.onboard_sums import AxisCard
+from host.planning.onboard_sums import AxisCard
 from host.twin.testcard.cards import Card, Segment, input_s
 from host.wire.flight_card import AXES, HEAD, TRAVEL_US, card_bytes, card_faults, number, scale
 from host.wire.schema_text import packed_schema

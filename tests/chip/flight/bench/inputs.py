@@ -17,7 +17,7 @@ from flight.input_rig import InputRig
 from flight.rig import SERVOS, check_card, make_card, take_log
 from flight.settings import settings_image
 from host.planning.learning_card import SIX_HARMONICS, LearningCondition, learning_card
-from host.sysid.estimators.onboard_sums import ROLL
+from host.planning.onboard_sums import ROLL
 from host.wire.schema_text import packed_schema
 from numpy.typing import NDArray
 from owners import find_member

@@ -11,15 +11,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-
-from host.sysid.estimators.onboard_sums import (
+from host.planning.onboard_sums import (
     PITCH,
     SAMPLE_HZ,
     YAW,
     AxisCard,
     FourierSums,
 )
+from numpy.typing import NDArray
 
 PRODUCTS_AT_ONCE = 5
 LEAST_LEFT = 1e-5
