@@ -163,7 +163,6 @@ CASES = (
         "white",
         methods=[
             "hopfield-whitened",
-            "hopfield-line-search",
             "neural-delta",
             "genetic",
             "unscented-kalman",
