@@ -14,7 +14,7 @@ from pathlib import Path
 from host.compiled import prefer_machine_code
 from host.errors import ExitCode
 from host.extras import install_hint
-from host.sysid.estimators.method_registry import methods as known_methods
+from host.sysid.estimators import methods as known_methods
 from host.thesis.hopfield import ITERATIONS
 
 from studies import (

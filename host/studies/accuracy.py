@@ -15,10 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.sysid.estimators.regression import regression_equations, solve_least_squares
+from host.sysid.estimators import regression_equations
+from host.sysid.estimators.regression import solve_least_squares
 from host.sysid.estimators.start_values import start_values
+from host.sysid.models import Maneuver
 from host.sysid.models.diagnostics import reference_values
-from host.sysid.models.maneuver import Maneuver
 from host.sysid.numerics.output_error import covariance_of_free, minimise
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.thesis.hopfield import network

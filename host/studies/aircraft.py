@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from host.arrays import Array
-from host.sysid.models.state_space_model import LinearModel, Parameter, Term, free_model
+from host.sysid.models import LinearModel, Parameter, Term, free_model
 
 FOOT_M = 0.3048
 SPEED_FTPS = 176.0

@@ -19,8 +19,8 @@ from host.arrays import Array
 from host.constants import NORMAL_95
 from host.errors import IdentificationError
 from host.readers.even_grid import even_columns
-from host.sysid.answer.truth_comparison import true_coefficients
-from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+from host.sysid.answer import true_coefficients
+from host.sysid.coefficients import CoefficientAnswer
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.pipeline import at_hand, identify_columns
 from host.twin.sensors.sensor_delays import dlpf_for, sensor_delays

@@ -6,7 +6,7 @@ variance and scale of the Dryden one (MIL-F-8785C).
 
 import numpy as np
 from host.arrays import Array
-from host.sysid.models.maneuver import Maneuver
+from host.sysid.models import Maneuver
 from host.sysid.numerics.output_error_problem import OutputProblem
 from scipy import linalg
 

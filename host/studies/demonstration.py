@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from host.readers.even_grid import even_columns
-from host.sysid.answer.truth_comparison import true_coefficients
+from host.sysid.answer import true_coefficients
 from host.sysid.pipeline import at_hand, identify_columns
 from host.twin.virtual import virtual_flight
 

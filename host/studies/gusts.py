@@ -22,9 +22,8 @@ from host.aircraft.linearisation import linearise
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_template import coefficient_template
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import MATRICES, LinearModel
-from host.sysid.models.templates import Trim, template
+from host.sysid.models import LinearModel, Maneuver, Trim, template
+from host.sysid.models.state_space_model import MATRICES
 from host.twin.flight import pilot
 from scipy import linalg
 

@@ -23,8 +23,7 @@ from host.compiled import prefer_machine_code
 from host.errors import IdentificationError
 from host.instrument.instrument_errors import usual_errors
 from host.physical.recording import FOREIGN, Recording
-from host.sysid.answer.marks import CAREFUL, TRUSTED
-from host.sysid.answer.verdict import verdict_of
+from host.sysid.answer import CAREFUL, TRUSTED, verdict_of
 from host.sysid.pipeline import at_hand, identify_columns
 
 import host

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from host.arrays import Array
-from host.sysid.answer.marks import CAREFUL, TRUSTED
+from host.sysid.answer import CAREFUL, TRUSTED
 from numpy.typing import NDArray
 
 from studies.study_table import Cell, Table

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.sysid.estimators.method_registry import fit, methods
+from host.sysid.estimators import fit, methods
+from host.sysid.models import Maneuver
 from host.sysid.models.diagnostics import reference_values
-from host.sysid.models.maneuver import Maneuver
 
 from studies.aircraft import navion_structured
 from studies.coverage import NOISES, coloured_noise

@@ -29,12 +29,9 @@ from host.instrument.instrument_errors import (
     standard_errors,
 )
 from host.physical.recording import AUTOPILOT
-from host.sysid.answer.marks import CAREFUL, TRUSTED
+from host.sysid.answer import CAREFUL, TRUSTED
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
-from host.sysid.pipeline import prepare, read_flight
-from host.sysid.pipeline.identification import Identification
-from host.sysid.pipeline.known_aircraft import aircraft_data
-from host.sysid.pipeline.reading_options import ReadingOptions
+from host.sysid.pipeline import Identification, ReadingOptions, aircraft_data, prepare, read_flight
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.outcome.autopilot_logs import write_autopilot_log
 from host.twin.outcome.ideal import true_table

@@ -35,8 +35,7 @@ from host.aircraft.attitude import euler
 from host.aircraft.rigid_body import derivative, step
 from host.compiled import compiled_fast
 from host.sysid.aerodynamics.varying_airspeed import VaryingModel
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.templates import Trim
+from host.sysid.models import Maneuver, Trim
 from host.twin.flight import pilot
 
 from studies.gusts import (

@@ -15,12 +15,11 @@ from pathlib import Path
 import numpy as np
 from host.aircraft.mass_properties import airframe_data
 from host.log import read_log
-from host.sysid.answer.truth_comparison import true_coefficients
+from host.sysid.answer import true_coefficients
 from host.sysid.estimators.recursive import fit_recursive_fourier
 from host.sysid.flight.flight_tables import read_flight_columns
 from host.sysid.flight.maneuver_detection import detect_maneuvers
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model_file import model_from
+from host.sysid.models import Maneuver, model_from
 
 from studies.linear import derivatives
 from studies.radio_flights import RadioFlight, radio_flight

@@ -17,7 +17,7 @@ from host.constants import NORMAL_95
 from host.errors import IdentificationError
 from host.planning.optimal_card import optimal_card, standard_card
 from host.planning.prior_range import random_aircraft
-from host.sysid.answer.truth_comparison import true_coefficients
+from host.sysid.answer import true_coefficients
 from host.sysid.pipeline import identify
 from host.twin.testcard.cards import BEFORE_S, Card, Pilot, Segment, duration_s
 from host.twin.virtual import virtual_flight

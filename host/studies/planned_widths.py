@@ -15,7 +15,7 @@ import numpy as np
 from host.planning.card_planning import design
 from host.planning.predicted_widths import predict_widths
 from host.readers.even_grid import even_columns
-from host.sysid.answer.truth_comparison import true_coefficients
+from host.sysid.answer import true_coefficients
 from host.sysid.pipeline import at_hand, identify_columns
 from host.twin.testcard.cards import Card, load
 from host.twin.virtual import virtual_flight

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators import fit
+from host.sysid.models import LinearModel, Maneuver, free_model
 from host.sysid.models.diagnostics import (
     EVEN_ODDS,
     NOT_IDENTIFIABLE,
@@ -24,8 +25,6 @@ from host.sysid.models.diagnostics import (
     bound_exceedance_probability,
     reference_values,
 )
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel, free_model
 from host.sysid.numerics.output_error import covariance_of_free, minimise
 from host.sysid.numerics.output_error_problem import OutputProblem
 from scipy import special

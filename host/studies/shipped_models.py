@@ -24,9 +24,8 @@ import pandas as pd
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.errors import IdentificationError
-from host.sysid.answer.verdict import verdict_of
-from host.sysid.models.equation_file import equations_from
-from host.sysid.models.nonlinear_model import NonlinearModel
+from host.sysid.answer import verdict_of
+from host.sysid.models import NonlinearModel, equations_from
 from host.twin.testcard.cards import Card, load
 from host.twin.virtual import VirtualFlight, virtual_flight
 

@@ -18,10 +18,9 @@ from host.compiled import prefer_machine_code
 from host.constants import GRAVITY_MPS2
 from host.errors import IdentificationError
 from host.physical.recording import FOREIGN, Recording
-from host.sysid.answer.marks import CAREFUL, TRUSTED
-from host.sysid.answer.verdict import verdict_of
+from host.sysid.answer import CAREFUL, TRUSTED, verdict_of
 from host.sysid.flight.maneuver_detection import DetectedManeuver
-from host.sysid.models.templates import Trim, template
+from host.sysid.models import Trim, template
 from host.sysid.pipeline import at_hand, identify_columns
 from scipy import signal
 

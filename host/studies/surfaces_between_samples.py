@@ -15,7 +15,7 @@ from host.arrays import Array
 from host.compiled import prefer_machine_code
 from host.physical.recording import FOREIGN, Recording
 from host.sysid.flight.maneuver_detection import DetectedManeuver
-from host.sysid.models.templates import Trim, template
+from host.sysid.models import Trim, template
 from host.sysid.pipeline import at_hand, identify_columns
 from scipy import linalg, signal
 

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from host.arrays import Array
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import free_model
+from host.sysid.models import Maneuver, free_model
 from host.thesis.error_figures import thesis_program_error_percent
 from host.thesis.hopfield import (
     ITERATIONS,

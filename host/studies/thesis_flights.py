@@ -19,9 +19,8 @@ import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.readers.even_grid import even_columns
-from host.sysid.estimators.equation_error import fit_equation_error
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel, free_model
+from host.sysid.estimators import fit_equation_error
+from host.sysid.models import LinearModel, Maneuver, free_model
 from host.sysid.pipeline import at_hand, identify_columns
 from host.thesis.error_figures import thesis_program_error_percent, thesis_sum_of_mean_errors
 from host.thesis.hopfield import SWEEPS, free_run, line_search, network

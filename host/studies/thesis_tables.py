@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from host.arrays import Array
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel, free_model
+from host.sysid.models import LinearModel, Maneuver, free_model
 from host.thesis.error_figures import thesis_program_error_percent
 from host.thesis.hopfield import (
     LAMBDA,

@@ -15,11 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from host.arrays import Array, BoolArray
 from host.errors import IdentificationError
+from host.sysid.estimators import fit
 from host.sysid.estimators.filter_error import information_at
 from host.sysid.estimators.gust_model import ROLL_GUST, gust_model
-from host.sysid.estimators.method_registry import fit
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models import LinearModel, Maneuver
 
 from studies.gusts import AXES, NOISE, fly, gusty_aircraft, spectrum
 from studies.nonlinear_gusts import fly_nonlinear, varying

@@ -19,8 +19,8 @@ from host.aircraft.mass_properties import airframe_data
 from host.errors import IdentificationError
 from host.live.estimates.flight_estimate import FlightEstimate, FlightEstimator
 from host.live.estimates.wanted_widths import WANTED_PERCENT
-from host.sysid.answer.truth_comparison import true_coefficients
-from host.sysid.pipeline.stages import identify
+from host.sysid.answer import true_coefficients
+from host.sysid.pipeline import identify
 from host.twin.testcard.cards import Card, load
 
 from studies.linear import derivatives

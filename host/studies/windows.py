@@ -22,13 +22,11 @@ import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.readers.even_grid import even_columns
-from host.sysid.answer.truth_comparison import true_coefficients
-from host.sysid.estimators.method_registry import fit
+from host.sysid.answer import true_coefficients
+from host.sysid.estimators import fit
 from host.sysid.flight.maneuver_detection import FLYING_SHARE, detect_maneuvers
 from host.sysid.flight.maneuver_selection import SURFACES, joined_windows, select_maneuvers
-from host.sysid.models.fit_result import FitResult
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel, Parameter, Term
+from host.sysid.models import FitResult, LinearModel, Maneuver, Parameter, Term
 from host.sysid.numerics.output_error import covariance_of_free, minimise
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.pipeline import at_hand, identify_columns

@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from host.arrays import Array
 from host.sysid.flight.maneuver_detection import DetectedManeuver
-from host.sysid.models.state_space_model import LinearModel
-from host.sysid.models.templates import Trim, template
+from host.sysid.models import LinearModel, Trim, template
 from scipy import signal
 
 from studies.coverage import coloured_noise

@@ -18,10 +18,9 @@ import numpy as np
 from host.compiled import prefer_machine_code
 from host.errors import IdentificationError
 from host.physical.recording import FOREIGN, Recording
-from host.sysid.answer.marks import CAREFUL, TRUSTED
-from host.sysid.answer.verdict import verdict_of
+from host.sysid.answer import CAREFUL, TRUSTED, verdict_of
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.models.maneuver import Maneuver
+from host.sysid.models import Maneuver
 from host.sysid.numerics.input_coherence import input_coherence
 from host.sysid.numerics.output_error import minimise
 from host.sysid.numerics.output_error_problem import OutputProblem

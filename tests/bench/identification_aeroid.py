@@ -28,9 +28,7 @@ from host.arrays import Array
 from host.constants import GRAVITY_MPS2, NORMAL_95
 from host.errors import IdentificationError
 from host.sysid.flight.maneuver_detection import DetectedManeuver
-from host.sysid.pipeline import prepare, read_flight
-from host.sysid.pipeline.known_aircraft import aircraft_data
-from host.sysid.pipeline.reading_options import ReadingOptions
+from host.sysid.pipeline import ReadingOptions, aircraft_data, prepare, read_flight
 from numpy.typing import NDArray
 
 Float = NDArray[np.float64]

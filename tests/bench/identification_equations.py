@@ -24,8 +24,7 @@ from host.constants import GRAVITY_MPS2
 from host.errors import IdentificationError
 from host.files.user_text import parse_toml
 from host.sysid import Maneuver, fit
-from host.sysid.models.equation_file import equations_from
-from host.sysid.models.nonlinear_model import NonlinearModel
+from host.sysid.models import NonlinearModel, equations_from
 from host.sysid.numerics.nonlinear_problem import output_problem
 from scipy import integrate, optimize
 

@@ -17,7 +17,7 @@ import numba
 import numpy as np
 from host.arrays import Array
 from host.sysid.estimators.regression import solve_normal_equations
-from host.sysid.models.maneuver import Maneuver
+from host.sysid.models import Maneuver
 from host.thesis.hopfield import iterate_until, largest_stable_gain, network
 from studies.aircraft import FOOT_M, navion_free
 from studies.data import with_rates

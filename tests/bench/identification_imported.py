@@ -25,7 +25,7 @@ from host.aircraft.mass_properties import airframe_data
 from host.constants import NORMAL_95
 from host.sysid.flight.flight_tables import read_flight_columns
 from host.sysid.numerics.differentiation import local_polynomial
-from host.sysid.pipeline.known_aircraft import aircraft_data
+from host.sysid.pipeline import aircraft_data
 from host.sysid.pipeline.surface_travel import with_surface_angles
 from host.twin.flight.fly import fly
 from host.twin.outcome.autopilot_logs import write_autopilot_log

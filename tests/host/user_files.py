@@ -194,11 +194,9 @@ def use_model(path: Path, rng: random.Random) -> None:
     """As `identify --model` and `simulate --aircraft` do."""
     from host.planning.identified_aircraft import is_model
     from host.sysid.answer.conversion_table import FlightCondition, convert
-    from host.sysid.coefficients.coefficient_model import (
-        is_coefficient_model,
-        read_coefficient_model,
-    )
-    from host.sysid.models.model_file import read_model, read_trim
+    from host.sysid.coefficients import is_coefficient_model, read_coefficient_model
+    from host.sysid.models import read_model
+    from host.sysid.models.model_file import read_trim
 
     del rng
     if is_coefficient_model(path):

@@ -80,6 +80,7 @@ HOST_NEVERS = (
 
 # Constants of physics and geometry with one owner, and how near to one a number is that means it.
 CONSTANTS = "host/src/host/constants.py"
+SYSID = "host/src/host/sysid"
 KNOWN_NUMBERS = {
     "GRAVITY_MPS2": 9.80665,
     "DEG_PER_RAD": 180.0 / math.pi,
@@ -87,6 +88,10 @@ KNOWN_NUMBERS = {
     "NORMAL_95": 1.96,
 }
 NEAR = 1e-3
+# Names that a room of sysid offers; and imports of its modules by path from outside of sysid, by
+# file and module: that number only falls, whoever leaves fewer lowers it.
+MOST_FACE_NAMES = 12
+INNER_IMPORTS = 535
 # Files that every package may have.
 COMMON_NAMES = {"__init__.py", "__main__.py"}
 
@@ -233,7 +238,34 @@ def constant_breaches(root: Path) -> Iterator[str]:
                     yield f"{name}:{node.lineno}: host.constants has {constant}"
 
 
+def face_breaches(root: Path) -> Iterator[str]:
+    """Yield a line for every face that offers too many names, or one that a module hides."""
+    for path in sorted((root / SYSID).glob("*/__init__.py")):
+        names = _offered(ast.parse(path.read_text(encoding="utf-8")))
+        place = path.relative_to(root)
+        if len(names) > MOST_FACE_NAMES:
+            yield f"{place}: offers {len(names)} names, at most {MOST_FACE_NAMES}"
+        for name in names:
+            if (path.parent / f"{name}.py").is_file():
+                yield f"{place}: {name} is a module too, which hides it once it is imported"
+
+
+def inner_imports(root: Path) -> set[tuple[str, str]]:
+    """Return file and module of every import from outside of sysid that passes a face by."""
+    found = set()
+    for folder in ("host/src", "host/studies", "tests"):
+        for path in _files(root / folder, {".py"}):
+            if (root / SYSID) in path.parents or "host.sysid." not in path.read_text("utf-8"):
+                continue
+            for _, module in _imports(ast.parse(path.read_text(encoding="utf-8")), path):
+                inside = module.split(".")[2:4] if module.startswith("host.sysid.") else []
+                if len(inside) == 2 and (root / SYSID / inside[0] / f"{inside[1]}.py").is_file():
+                    found.add((str(path.relative_to(root)), ".".join(inside)))
+    return found
+
+
 RULES = (
+    face_breaches,
     basename_breaches,
     constant_breaches,
     verb_breaches,
@@ -247,6 +279,14 @@ RULES = (
     link_breaches,
     simulator_breaches,
 )
+
+
+def _offered(tree: ast.Module) -> list[str]:
+    """Return the names in `__all__` of a package."""
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
+            return list(ast.literal_eval(node.value))
+    return []
 
 
 def _constants_in(node: ast.expr) -> Iterator[str]:
@@ -308,6 +348,34 @@ def _imports(tree: ast.Module, path: Path) -> Iterator[tuple[int, str]]:
             name = called.id if isinstance(called, ast.Name) else called
             if name in ("import_module", "__import__"):
                 yield node.lineno, str(node.args[0].value)
+
+
+def test_rooms_of_sysid_are_entered_by_their_faces() -> None:
+    assert len(inner_imports(ROOT)) <= INNER_IMPORTS, "import what a face offers from the face"
+
+
+def test_an_import_that_passes_a_face_by_is_counted(tmp_path: Path) -> None:
+    models = tmp_path / SYSID / "models"
+    models.mkdir(parents=True)
+    (models / "maneuver.py").write_text("from host.sysid.models.maneuver import Maneuver")
+    study = tmp_path / "host/studies/flown.py"
+    study.parent.mkdir()
+    study.write_text("from host.sysid.models import Maneuver\nimport host.sysid.models")
+    assert inner_imports(tmp_path) == set()
+    for text in ("from host.sysid.models.maneuver import A, B", "import host.sysid.models.maneuver",
+                 "from host.sysid.models import maneuver"):  # fmt: skip
+        study.write_text(text)
+        assert inner_imports(tmp_path) == {("host/studies/flown.py", "models.maneuver")}
+
+
+def test_a_face_of_too_many_names_or_of_a_module_is_found(tmp_path: Path) -> None:
+    face = tmp_path / SYSID / "models/__init__.py"
+    face.parent.mkdir(parents=True)
+    (face.parent / "maneuver.py").touch()
+    face.write_text(f"__all__ = {[f'a{k}' for k in range(13)]}")
+    assert "offers 13 names" in "".join(face_breaches(tmp_path))
+    face.write_text('__all__ = ["maneuver"]')
+    assert "maneuver is a module too" in "".join(face_breaches(tmp_path))
 
 
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)

@@ -19,9 +19,8 @@ from host.aircraft.trim import solve
 from host.cli import main
 from host.errors import IdentificationError
 from host.planning.identified_aircraft import is_model, with_models
+from host.sysid.models import LinearModel, Trim, template
 from host.sysid.models.model_text import model_text
-from host.sysid.models.state_space_model import LinearModel
-from host.sysid.models.templates import Trim, template
 from host.twin.faults import Fault
 from host.twin.flight.fly import fly
 from host.twin.outcome.truth_files import maneuvers

@@ -20,7 +20,7 @@ from host.physical.recording import Recording
 from host.resources import resource
 from host.sysid.compatibility.path_preparation import prior
 from host.sysid.flight.flight_tables import FlightColumns
-from host.sysid.pipeline.known_aircraft import aircraft_data
+from host.sysid.pipeline import aircraft_data
 from host.twin.flight.draws import DRAWN_ERRORS, draw
 from host.twin.outcome.virtual_calibration import calibration
 

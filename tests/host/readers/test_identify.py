@@ -13,7 +13,7 @@ from host.cli import main
 from host.export.dataflash_writer import Records
 from host.readers.autopilot_flight import read_autopilot
 from host.sysid.flight.flight_tables import read_flight_columns
-from host.sysid.pipeline.known_aircraft import aircraft_data
+from host.sysid.pipeline import aircraft_data
 from host.sysid.pipeline.surface_travel import with_surface_angles
 from host.twin.outcome import ardupilot_log
 from host.twin.outcome.truth_files import maneuvers

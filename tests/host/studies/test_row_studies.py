@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.errors import IdentificationError
-from host.sysid.answer.marks import TRUSTED
+from host.sysid.answer import TRUSTED
 from studies import row_studies, wrong_models
 from studies.interval_rows import interval_figure, interval_table
 from studies.row_studies import ROW_STUDIES, RowStudy

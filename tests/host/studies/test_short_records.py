@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from host.sysid.models.templates import template
+from host.sysid.models import template
 from scipy import linalg
 from studies import short_records as study
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.sysid.estimators.method_registry import methods
+from host.sysid.estimators import methods
 from host.sysid.flight.maneuver_detection import DetectedManeuver
+from host.sysid.models import free_model
 from host.sysid.models.diagnostics import GRADES, NOT_IDENTIFIABLE
-from host.sysid.models.state_space_model import free_model
 from host.thesis.hopfield import LAMBDA, STEP_S, largest_stable_gain, network
 from studies.__main__ import main
 from studies.accuracy import run_case as accuracy

@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from host.readers.even_grid import even_columns
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import free_model
+from host.sysid.models import Maneuver, free_model
 from host.thesis.hopfield import free_run
 from host.twin.virtual import VirtualFlight, virtual_flight
 from studies.coefficients import CoefficientTally, true_delays, truths

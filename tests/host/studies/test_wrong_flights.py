@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from host.sysid.models.templates import Trim, template
+from host.sysid.models import Trim, template
 from scipy import signal
 from studies.wrong_flights import DT_S, MANEUVER_S, NOISE_SD, TRUTH, fly
 

@@ -11,11 +11,11 @@ from host.aircraft.powerplant import Powerplant
 from host.instrument.deviations import SensorErrorModel
 from host.instrument.instrument_errors import InstrumentErrors
 from host.physical.recording import OWN, Recording
-from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+from host.sysid.coefficients import CoefficientAnswer
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.maneuver_detection import DetectedManeuver
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models import LinearModel
 from host.sysid.pipeline import aircraft_data, at_hand, flight_preparation, identify_columns
 
 KNOWN = aircraft_data("ultrastick25e")

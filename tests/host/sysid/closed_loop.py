@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from host.arrays import Array
-from host.sysid.models.state_space_model import LinearModel
-from host.sysid.models.templates import Trim, template
+from host.sysid.models import LinearModel, Trim, template
 from numpy.random import Generator
 from studies.wrong_flights import NOISE_SD, TRUTH
 

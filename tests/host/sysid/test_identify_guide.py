@@ -13,7 +13,7 @@ from host.cli import main
 from host.export.toml import dumps
 from host.instrument.deviations import sensor_error_model
 from host.sysid.flight.flight_tables import read_columns
-from host.sysid.models.model_file import read_model
+from host.sysid.models import read_model
 
 from tests.host.logs import ROOT
 

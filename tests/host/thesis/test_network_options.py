@@ -8,7 +8,8 @@ import pandas as pd
 import pytest
 from host.errors import IdentificationError
 from host.sysid import fit
-from host.sysid.estimators.method_options import check_options, options_of, read_options
+from host.sysid.estimators import read_options
+from host.sysid.estimators.method_options import check_options, options_of
 from host.thesis.hopfield import line_search, network
 from studies.aircraft import navion_free
 from studies.data import with_rates

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from host.cli import main
 from host.readers.derived_columns import derived_columns
-from host.sysid.models.model_file import read_model
+from host.sysid.models import read_model
 from host.sysid.models.named_models import model_path, shipped_files, shipped_lines
 from host.sysid.pipeline.requested_models import requested_models
 from host.thesis.thesis_methods import MODELS

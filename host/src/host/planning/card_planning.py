@@ -23,9 +23,8 @@ from host.aircraft.trim import solve
 from host.constants import GRAVITY_MPS2, NORMAL_95
 from host.errors import IdentificationError
 from host.sysid.estimators.start_values import start_values
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
-from host.sysid.models.templates import Trim as Condition
+from host.sysid.models import LinearModel, Maneuver
+from host.sysid.models import Trim as Condition
 from host.sysid.models.templates import lateral, longitudinal
 from host.sysid.numerics.output_error import covariance_of_free, minimise
 from host.sysid.numerics.output_error_problem import OutputProblem

@@ -19,8 +19,8 @@ from host.errors import UsageError
 from host.files.user_text import read_text
 from host.planning.prior_range import LARGEST, random_aircraft
 from host.sysid.answer.conversion_table import saved_values
-from host.sysid.models.model_file import read_model, read_trim
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models import LinearModel, read_model
+from host.sysid.models.model_file import read_trim
 
 FIRST_DRAW = 980_101
 

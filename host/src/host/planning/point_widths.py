@@ -31,8 +31,8 @@ from host.planning.predicted_widths import (
     flown_columns,
     predict_widths,
 )
+from host.sysid.coefficients import CoefficientModel, standard_model
 from host.sysid.coefficients.coefficient_estimator import coefficient_estimator
-from host.sysid.coefficients.coefficient_model import CoefficientModel, standard_model
 from host.sysid.coefficients.window_spectra import ResidualSpectra
 from host.sysid.flight.maneuver_detection import DetectedManeuver, detect_maneuvers
 from host.sysid.flight.reconstructed_flight import reconstruct_flight

@@ -23,7 +23,7 @@ from host.readers.even_grid import even_arrays
 from host.readers.foreign_tables import from_frame
 from host.readers.recorded import recording_of_table
 from host.sysid.answer.parameter_units import parameter_unit
-from host.sysid.coefficients.coefficient_fit import CoefficientFit
+from host.sysid.coefficients import CoefficientFit
 from host.sysid.coefficients.coefficient_intervals import CoefficientIntervals
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.pipeline import identify

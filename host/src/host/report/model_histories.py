@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from host.sysid.flight.linear_answer import Answer
-    from host.sysid.models.maneuver import Maneuver
+    from host.sysid.models import Maneuver
 
 _MEASURED, _ONE_STEP, _FREE, _INPUT = "0.6", "C0", "C3", "C2"
 _GAP_S = 0.5

@@ -26,11 +26,11 @@ from host.report.parameter_section import method_comparison, parameter_tables
 from host.report.shown_flight import ShownFlight, is_simulated
 from host.report.strip_figure import overview_figure
 from host.report.track_figure import track_figure
-from host.sysid.answer.marks import MARKS
+from host.sysid.answer import MARKS
 from host.sysid.answer.mat_file import labels
 
 if TYPE_CHECKING:
-    from host.sysid.pipeline.identification import Identification
+    from host.sysid.pipeline import Identification
 
 _TRUST, _CARE, _SMALL, _NOT, _NEVER = MARKS
 _BESIDE = "beside"  # file of the second method's numbers in the page

@@ -19,10 +19,10 @@ from host.report.plotting import page_file, write_text
 from host.report.provenance import hashes, versions
 from host.report.report_page import ReportParts, report_page
 from host.report.shown_flight import ShownFlight
-from host.sysid.pipeline.stages import identify
+from host.sysid.pipeline import identify
 
 if TYPE_CHECKING:
-    from host.sysid.pipeline.identification import Identification
+    from host.sysid.pipeline import Identification
 
 BESIDE = "equation-error"
 _HEAD_BYTES = 4096

@@ -11,9 +11,7 @@ from scipy import optimize
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.estimators.output_error_fit import fit_output_error, sample_periods
-from host.sysid.models.fit_result import FitResult
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models import FitResult, LinearModel, Maneuver
 from host.sysid.numerics.output_error_problem import OutputProblem
 
 POPULATION = 40

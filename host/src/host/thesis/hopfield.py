@@ -23,11 +23,9 @@ import numpy as np
 from host.arrays import Array
 from host.compiled import compiled
 from host.errors import IdentificationError
-from host.sysid.estimators.equation_error import fit_equation_error
-from host.sysid.estimators.regression import normal_equations, regression_equations
-from host.sysid.models.fit_result import FitResult
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.estimators import fit_equation_error, regression_equations
+from host.sysid.estimators.regression import normal_equations
+from host.sysid.models import FitResult, LinearModel, Maneuver
 from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.recursion import simulate
 from host.thesis.error_figures import thesis_program_error_percent

@@ -9,11 +9,9 @@ from scipy import optimize
 
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.sysid.estimators.equation_error import fit_equation_error
-from host.sysid.estimators.regression import RegressionEquation, regression_equations
-from host.sysid.models.fit_result import FitResult
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.estimators import fit_equation_error, regression_equations
+from host.sysid.estimators.regression import RegressionEquation
+from host.sysid.models import FitResult, LinearModel, Maneuver
 
 NEURONS = 6
 DECAY_LEAST = 1e-3

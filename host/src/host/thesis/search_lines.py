@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from host.sysid.estimators.settling import settling_lines
-from host.sysid.models.fit_result import FitResult
+from host.sysid.models import FitResult
 
 STILL = 1e-4  # of the error of the line search, lowered by less: its start but for rounding
 

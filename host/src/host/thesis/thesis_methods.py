@@ -5,14 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from host.files.quantities import Quantity
-from host.sysid.estimators.estimation_method import (
-    Method,
-    MethodOption,
-    number,
-    numbers,
-    one_of,
-    whole_number,
-)
+from host.sysid.estimators import Method, MethodOption, number, numbers, one_of, whole_number
 
 MODELS = Path(__file__).with_name("models")
 

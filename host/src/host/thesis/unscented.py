@@ -9,9 +9,7 @@ import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.estimators.kalman import JointFilter, fit_jointly
-from host.sysid.models.fit_result import FitResult
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models import FitResult, LinearModel, Maneuver
 
 SIGMA_POINT_SPREAD = 1e-1  # alpha of the sigma points
 

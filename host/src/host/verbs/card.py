@@ -97,7 +97,7 @@ def act(args: argparse.Namespace, console: CardConsole, data: bytes | None) -> i
         print("the logger has this card" if same else "the logger has another card")
         return int(ExitCode.OK if same else ExitCode.CHECK)
     if args.file is not None:
-        from host.sysid.answer.atomic_files import atomic_write
+        from host.sysid.answer import atomic_write
 
         with atomic_write(args.file) as part:
             part.write_bytes(kept)

@@ -48,13 +48,13 @@ def run(args: argparse.Namespace) -> int:
     from host.aircraft.file import load_measured
     from host.aircraft.origin import announce_aircraft
     from host.errors import ExitCode, UsageError
+    from host.sysid.answer import json_text
     from host.sysid.answer.conversion_table import (
         FlightCondition,
         conversion_document,
         conversion_lines,
         convert,
     )
-    from host.sysid.answer.json_document import json_text
 
     for option, quantity in (("airspeed", AIRSPEED), ("density", DENSITY), ("alpha", ALPHA_DEG)):
         value = getattr(args, option)

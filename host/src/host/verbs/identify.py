@@ -14,7 +14,7 @@ from host.placed_arguments import StorePlaced, of_each, stretches_of_each
 from host.source_arguments import add_data_choices
 
 if TYPE_CHECKING:
-    from host.sysid.answer.output_files import OutputPaths
+    from host.sysid.answer import OutputPaths
 
 
 def add_parser(subparsers: Any) -> None:
@@ -120,11 +120,11 @@ def _run(args: argparse.Namespace) -> int:
     from host.aircraft.origin import announce_aircraft
     from host.errors import ExitCode
     from host.readers.autopilot_flight import chosen_sensors
-    from host.sysid.answer.output_files import check_outputs
-    from host.sysid.estimators.method_options import read_options
+    from host.sysid.answer import check_outputs
+    from host.sysid.estimators import read_options
+    from host.sysid.pipeline import identify
     from host.sysid.pipeline.arguments import option_words
     from host.sysid.pipeline.requested_models import requested_methods
-    from host.sysid.pipeline.stages import identify
 
     if lines := _asked_for(args):
         print("\n".join(lines))
@@ -183,7 +183,7 @@ def _asked_for(args: argparse.Namespace) -> list[str]:
 
 def _places(args: argparse.Namespace) -> OutputPaths:
     """Return where files go, and every file that the answer is made from."""
-    from host.sysid.answer.output_files import OutputPaths
+    from host.sysid.answer import OutputPaths
 
     placed = [*args.map, *args.calibration, *args.truth]
     given = [*args.source, *(path for _, path in placed), args.prior]

@@ -38,7 +38,8 @@ def run(args: argparse.Namespace) -> int:
     from host.errors import ExitCode, IdentificationError
     from host.readers.autopilot_flight import chosen_sensors
     from host.readers.shipped_maps import LIST, map_lines
-    from host.sysid.answer.json_document import json_text, maneuver_document
+    from host.sysid.answer import json_text
+    from host.sysid.answer.json_document import maneuver_document
     from host.sysid.answer.maneuver_list import maneuver_lines
     from host.sysid.flight.flight_tables import read_columns
     from host.sysid.flight.maneuver_detection import detect_maneuvers, grade

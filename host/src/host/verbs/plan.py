@@ -250,7 +250,7 @@ def _write_logger_card(card: Card, args: argparse.Namespace) -> None:
     from host.physical.calibration import load_calibration
     from host.planning.learning_card import learned_axes
     from host.planning.logger_card import Envelope, logger_card
-    from host.sysid.answer.atomic_files import atomic_write
+    from host.sysid.answer import atomic_write
     from host.wire.card_text import card_lines
     from host.wire.flight_card import read_card
 
@@ -272,7 +272,7 @@ def _write_logger_card(card: Card, args: argparse.Namespace) -> None:
 
 
 def _save(path: Path, text: str) -> None:
-    from host.sysid.answer.atomic_files import atomic_write
+    from host.sysid.answer import atomic_write
 
     with atomic_write(path) as part:
         part.write_text(text, encoding="utf-8")

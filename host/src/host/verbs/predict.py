@@ -51,11 +51,11 @@ def run(args: argparse.Namespace) -> int:
     from host.errors import ExitCode, IdentificationError
     from host.readers.autopilot_flight import chosen_sensors
     from host.readers.shipped_maps import LIST, map_lines
-    from host.sysid.answer.output_files import OutputPaths, check_outputs
+    from host.sysid.answer import OutputPaths, check_outputs
     from host.sysid.flight.data_finding import check_lines
     from host.sysid.models.named_models import shipped_lines
+    from host.sysid.pipeline import predict
     from host.sysid.pipeline.arguments import option_words
-    from host.sysid.pipeline.prediction import predict
 
     if [str(name) for name in args.source] == [LIST] and not Path(LIST).exists():
         print("\n".join(shipped_lines()))

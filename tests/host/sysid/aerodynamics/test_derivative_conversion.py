@@ -21,8 +21,7 @@ from host.sysid.aerodynamics.derivative_conversion import (
     to_coefficients,
     to_derivatives,
 )
-from host.sysid.models.fit_result import FitResult
-from host.sysid.models.state_space_model import free_model
+from host.sysid.models import FitResult, free_model
 
 NAME = "ultrastick25e"
 AIRFRAME = airframe_data(NAME)

@@ -10,9 +10,7 @@ from host.constants import GRAVITY_MPS2
 from host.readers.even_grid import even_columns
 from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
 from host.sysid.aerodynamics.path_thrust import USUAL_DRAG, PathThrust, path_thrust
-from host.sysid.models.fit_result import FitResult
-from host.sysid.models.state_space_model import free_model
-from host.sysid.models.templates import Trim
+from host.sysid.models import FitResult, Trim, free_model
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
 

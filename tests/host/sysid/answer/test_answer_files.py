@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from host.cli import main
 from host.errors import IdentificationError
-from host.sysid.answer.atomic_files import atomic_write
+from host.sysid.answer import OutputPaths, atomic_write, check_outputs
 from host.sysid.answer.mat_file import labels, mat_name, write_mat
-from host.sysid.answer.output_files import OutputPaths, check_outputs
 from host.sysid.answer.simulators.forms import write_form
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.linear_answer import Answer

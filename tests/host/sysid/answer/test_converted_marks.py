@@ -8,9 +8,9 @@ from itertools import product
 
 import pytest
 from host.sysid.aerodynamics.coefficient_table import Coefficient
+from host.sysid.answer import CAREFUL, MARKS, TRUSTED, answer_document, json_text
 from host.sysid.answer.converted_marks import converted_marks
-from host.sysid.answer.json_document import answer_document, json_text
-from host.sysid.answer.marks import CAREFUL, MARKS, SMALL, TRUSTED, UNSURE
+from host.sysid.answer.marks import SMALL, UNSURE
 from host.sysid.answer.short_answer import short_table
 from host.sysid.answer.trust_rules import NO_EVIDENCE
 from host.sysid.flight.linear_answer import Answer

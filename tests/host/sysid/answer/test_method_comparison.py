@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 from host.cli import main
+from host.sysid.answer import verdict_lines
 from host.sysid.answer.method_comparison import method_table
-from host.sysid.answer.verdict import verdict_lines
-from host.sysid.estimators.method_registry import methods
+from host.sysid.estimators import methods
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_model import STAGED

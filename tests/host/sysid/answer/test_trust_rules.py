@@ -4,16 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from host.sysid.answer.json_document import answer_document
-from host.sysid.answer.marks import CAREFUL, TRUSTED
+from host.sysid.answer import CAREFUL, TRUSTED, answer_document, verdict_lines, verdict_of
 from host.sysid.answer.servo_lines import servo_document
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, driven_by_inputs
-from host.sysid.answer.verdict import verdict_lines, verdict_of
 from host.sysid.estimators.servo_parameters import SERVO, ServoEstimate, ServoNumber
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.prediction_limits import Prediction
-from host.sysid.models.templates import Trim, template
+from host.sysid.models import Trim, template
 from studies.wrong_flights import LinearFlight, fly
 
 from tests.host.sysid.at_hand import identify

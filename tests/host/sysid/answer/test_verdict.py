@@ -5,16 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.aircraft.mass_properties import Condition
+from host.sysid.answer import verdict_lines
 from host.sysid.answer.estimate_lines import model_lines
 from host.sysid.answer.marks import share_text
 from host.sysid.answer.trust_rules import unpredicted_states
-from host.sysid.answer.verdict import verdict_lines
-from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators import fit
 from host.sysid.flight.linear_answer import Answer
+from host.sysid.models import Trim
 from host.sysid.models.diagnostics import SignalFit, collinearity, reference_values
 from host.sysid.models.modal_analysis import modes, modes_of
 from host.sysid.models.residual_delays import STANDARD_DELAYS
-from host.sysid.models.templates import TEMPLATES, Trim
+from host.sysid.models.templates import TEMPLATES
 from studies.aircraft import navion_structured
 from studies.data import noisy
 

@@ -8,9 +8,8 @@ from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
 from host.readers.even_grid import even_columns
+from host.sysid.coefficients import CoefficientFit, standard_model
 from host.sysid.coefficients.aero_equations import KINEMATIC, Equation, FlightHistory, equations
-from host.sysid.coefficients.coefficient_fit import CoefficientFit
-from host.sysid.coefficients.coefficient_model import standard_model
 from host.sysid.coefficients.coefficient_search import fit_coefficients
 from host.sysid.coefficients.window_spectra import Window
 from host.sysid.compatibility.inverse_sensor_model import Record

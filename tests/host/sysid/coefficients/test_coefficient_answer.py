@@ -10,17 +10,14 @@ import pytest
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.cli import main
 from host.sysid.aerodynamics.derivative_conversion import ConversionPoint, to_derivatives
+from host.sysid.answer import read_truth, true_coefficients
 from host.sysid.answer.figure_kinds import Bar, interval_bars, save
-from host.sysid.answer.truth_comparison import read_truth, true_coefficients
-from host.sysid.coefficients.coefficient_estimator import (
-    CoefficientAnswer,
-    merged_windows,
-)
+from host.sysid.coefficients import CoefficientAnswer
+from host.sysid.coefficients.coefficient_estimator import merged_windows
 from host.sysid.coefficients.coefficient_modes import coefficient_modes, quantities
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.maneuver_detection import DetectedManeuver
-from host.sysid.pipeline.identification import Identification
-from host.sysid.pipeline.stages import identify
+from host.sysid.pipeline import Identification, identify
 from scipy import io
 
 from tests.host.sysid.at_hand import identify_coefficients

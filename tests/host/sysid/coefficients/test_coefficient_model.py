@@ -16,13 +16,14 @@ from host.errors import IdentificationError
 from host.export import toml as tomlout
 from host.instrument.deviations import sensor_error_model
 from host.readers.even_grid import even_columns
-from host.sysid.coefficients.coefficient_fit import CoefficientFit, Derivative
-from host.sysid.coefficients.coefficient_model import (
+from host.sysid.coefficients import (
+    CoefficientFit,
     CoefficientModel,
-    parse_term,
     read_coefficient_model,
     standard_model,
 )
+from host.sysid.coefficients.coefficient_fit import Derivative
+from host.sysid.coefficients.coefficient_model import parse_term
 from host.sysid.coefficients.coefficient_search import fit_coefficients
 from host.sysid.coefficients.trim_derivatives import TrimMeans, derivatives_at_trim
 from host.sysid.coefficients.window_spectra import Window

@@ -9,7 +9,7 @@ from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
 from host.readers.even_grid import even_columns
-from host.sysid.coefficients.coefficient_fit import CoefficientFit
+from host.sysid.coefficients import CoefficientFit
 from host.sysid.coefficients.coefficient_search import fit_coefficients
 from host.sysid.coefficients.deletion_diagnostics import (
     FinalStep,

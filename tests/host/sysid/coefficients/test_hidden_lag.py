@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from host.sysid.answer.coefficient_rules import lag_beside
-from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+from host.sysid.coefficients import CoefficientAnswer
 from studies.foreign.aeroplane import TRAINER
 from studies.foreign.flight import fly
 from studies.foreign.instrument import Columns

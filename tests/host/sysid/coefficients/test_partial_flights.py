@@ -13,7 +13,7 @@ from host.aircraft.propulsion import propeller
 from host.errors import IdentificationError
 from host.physical.recording import SURFACES
 from host.readers.even_grid import even_columns
-from host.sysid.coefficients.coefficient_model import read_coefficient_model
+from host.sysid.coefficients import read_coefficient_model
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.arrays import Array
+from host.sysid.coefficients import CoefficientFit
 from host.sysid.coefficients.coefficient_fit import (
-    CoefficientFit,
     CoefficientHistory,
     Derivative,
     MeanCondition,

@@ -7,8 +7,8 @@ from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
+from host.sysid.coefficients import standard_model
 from host.sysid.coefficients.aero_equations import FlightHistory, equations
-from host.sysid.coefficients.coefficient_model import standard_model
 from host.sysid.coefficients.slow_gusts import (
     GUST_TERMS,
     LEGENDRE_TERMS,

@@ -11,10 +11,8 @@ from host.errors import IdentificationError
 from host.sysid.compatibility.flow_angles import FlowAngles, flying, reconstruct_flow_angles
 from host.sysid.compatibility.linear_smoother import Step, smooth
 from host.sysid.compatibility.reconstruction import Compatibility
-from host.sysid.pipeline import prepare, read_flight
+from host.sysid.pipeline import ReadingOptions, aircraft_data, prepare, read_flight
 from host.sysid.pipeline.flight_preparation import PreparedFlight
-from host.sysid.pipeline.known_aircraft import aircraft_data
-from host.sysid.pipeline.reading_options import ReadingOptions
 from host.twin.flight.fly import fly
 from host.twin.outcome.autopilot_logs import write_autopilot_log
 from host.twin.sensors.local_flow import air_data

@@ -20,10 +20,8 @@ from host.sysid.compatibility.ground_attitude import (
     update_by_standstill,
 )
 from host.sysid.compatibility.reconstruction import Compatibility, SensorErrorEstimate
-from host.sysid.pipeline import prepare, read_flight
+from host.sysid.pipeline import ReadingOptions, aircraft_data, prepare, read_flight
 from host.sysid.pipeline.flight_preparation import PreparedFlight
-from host.sysid.pipeline.known_aircraft import aircraft_data
-from host.sysid.pipeline.reading_options import ReadingOptions
 from host.twin.flight.fly import fly
 from host.twin.outcome.autopilot_logs import write_autopilot_log
 from host.twin.outcome.ideal import true_table

@@ -22,9 +22,7 @@ from host.sysid.estimators.filter_error_gust import fit_with_gust
 from host.sysid.estimators.gust_model import gust_model
 from host.sysid.estimators.gust_penetration import with_gust_penetration
 from host.sysid.flight.systematic_errors import systematic_error_shifts
-from host.sysid.models.fit_result import FitResult
-from host.sysid.models.state_space_model import LinearModel
-from host.sysid.models.templates import Trim, template
+from host.sysid.models import FitResult, LinearModel, Trim, template
 
 NAME = "ultrastick25e"
 Columns = dict[str, np.ndarray]

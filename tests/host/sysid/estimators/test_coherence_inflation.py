@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from host.sysid.estimators.coherence_inflation import COUNTED, inflate_by_coherence
 from host.sysid.estimators.gust_penetration import PREFIX, with_gust_penetration
-from host.sysid.models.fit_result import FitResult
-from host.sysid.models.templates import Trim, template
+from host.sysid.models import FitResult, Trim, template
 from host.sysid.numerics.input_coherence import InputCoherence
 
 

@@ -5,9 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.sysid.estimators.output_error_fit import fit_output_error
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model_file import read_model
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models import LinearModel, Maneuver, read_model
 from host.sysid.numerics.nonlinear_problem import output_problem
 
 TEXT = """\

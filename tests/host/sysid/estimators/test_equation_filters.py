@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.sysid.estimators.method_registry import fit
-from host.sysid.models.equation_file import equations_from
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model_file import model_from
-from host.sysid.models.nonlinear_model import NonlinearModel
+from host.sysid.estimators import fit
+from host.sysid.models import Maneuver, NonlinearModel, equations_from, model_from
 from host.sysid.numerics.equation_filter_problem import EquationFilterProblem
 from host.sysid.numerics.process_noise import discrete_noise
 from scipy import linalg

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 from host.sysid.estimators.filter_error import fit_filter_error
 from host.sysid.estimators.gust_model import gust_model
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
-from host.sysid.models.templates import Trim, template
+from host.sysid.models import LinearModel, Maneuver, Trim, template
 from host.sysid.numerics.filter_problem import FilterProblem, InnovationLikelihood
 from host.sysid.numerics.filter_scoring import (
     fisher_scoring,

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from host.sysid.estimators.filter_error_gust import fit_with_gust
 from host.sysid.estimators.gust_model import gust_model
-from host.sysid.models.maneuver import Maneuver
+from host.sysid.models import Maneuver, Trim, template
 from host.sysid.models.residual_delays import STANDARD_DELAYS, delays_of
-from host.sysid.models.templates import Trim, template
 from scipy import interpolate, linalg
 
 SPEED_MPS, DT_S, FINE = 18.0, 0.01, 10

@@ -11,9 +11,7 @@ from host.sysid.estimators.gust_penetration import (
     with_gust_penetration,
     without_gust_penetration,
 )
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
-from host.sysid.models.templates import Trim, template
+from host.sysid.models import LinearModel, Maneuver, Trim, template
 from scipy import linalg
 
 SPEED_MPS, SPAN_M, DT_S = 18.0, 1.8, 0.02

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from host.arrays import Array
-from host.sysid.estimators.method_registry import fit
-from host.sysid.models.equation_file import equations_from
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.nonlinear_model import NonlinearModel
+from host.sysid.estimators import fit
+from host.sysid.models import Maneuver, NonlinearModel, equations_from
 from host.sysid.numerics.equation_filter_problem import EquationFilterProblem
 from host.sysid.numerics.nonlinear_problem import NonlinearProblem
 from scipy import linalg

@@ -16,8 +16,7 @@ from host.sysid.flight.reconstructed_flight import (
     flown_maneuvers,
     reconstruct_flight,
 )
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.templates import Trim, template
+from host.sysid.models import Maneuver, Trim, template
 from scipy import signal
 
 DT_S, FINE = 0.02, 10

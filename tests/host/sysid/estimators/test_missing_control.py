@@ -6,8 +6,7 @@ Two parameters that are right beside it stay as they are known.
 import numpy as np
 import pytest
 from host.physical.recording import FOREIGN
-from host.sysid.answer.marks import TRUSTED
-from host.sysid.answer.verdict import verdict_of
+from host.sysid.answer import TRUSTED, verdict_of
 from host.sysid.flight.linear_answer import Answer
 from studies import wrong_flights
 from studies.wrong_flights import LinearFlight

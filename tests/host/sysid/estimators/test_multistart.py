@@ -8,8 +8,7 @@ from host.sysid.estimators import multistart as searching
 from host.sysid.estimators.homotopy import homotopy_start, stabilised_model
 from host.sysid.estimators.multistart import multistart, white_cost
 from host.sysid.estimators.start_values import start_values
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel, free_model
+from host.sysid.models import LinearModel, Maneuver, free_model
 from host.sysid.numerics.output_error import Optimum, minimise
 from host.sysid.numerics.output_error_problem import OutputProblem, Response
 from studies.aircraft import navion_free

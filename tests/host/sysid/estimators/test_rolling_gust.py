@@ -12,9 +12,7 @@ from host.sysid.estimators.gust_penetration import (
     with_unknown_roll_lag,
     without_gust_penetration,
 )
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
-from host.sysid.models.templates import Trim, template
+from host.sysid.models import LinearModel, Maneuver, Trim, template
 from scipy import linalg
 
 SPEED_MPS, DT_S, FINE = 18.0, 0.02, 10

@@ -14,7 +14,7 @@ from host.instrument.deviations import unknown_sensors
 from host.instrument.servo_prior import ServoPrior, servo_prior
 from host.physical.recording import Recording
 from host.sysid.compatibility.servo_response import behind_servos
-from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators import fit
 from host.sysid.estimators.servo_parameters import (
     ServoEstimate,
     _Profile,
@@ -22,10 +22,7 @@ from host.sysid.estimators.servo_parameters import (
     considered_servo,
     estimate_servo,
 )
-from host.sysid.models.fit_result import FitResult
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
-from host.sysid.models.templates import Trim, template
+from host.sysid.models import FitResult, LinearModel, Maneuver, Trim, template
 from host.sysid.numerics.output_error_problem import OutputProblem
 
 import host

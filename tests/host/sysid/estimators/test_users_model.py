@@ -10,9 +10,7 @@ from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.estimators import filter_error
 from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model_file import model_from
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models import LinearModel, Maneuver, model_from
 from scipy import signal
 
 DT_S, SAMPLES, FINE, AIRSPEED_MPS = 0.02, 500, 5, 17.0

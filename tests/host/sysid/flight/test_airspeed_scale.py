@@ -9,8 +9,7 @@ import pytest
 from host.instrument.deviations import SensorErrorModel, unknown_sensors
 from host.physical.calibration import load_calibration
 from host.physical.recording import FOREIGN, Recording
-from host.sysid.answer.marks import TRUSTED
-from host.sysid.answer.verdict import verdict_of
+from host.sysid.answer import TRUSTED, verdict_of
 from host.sysid.flight.airspeed_scale import (
     CERTAIN,
     CHECK,

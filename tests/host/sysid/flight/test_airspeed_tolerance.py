@@ -7,8 +7,7 @@ import pytest
 from host.instrument.deviations import airspeed_share
 from host.instrument.instrument_errors import usual_errors
 from host.physical.recording import AUTOPILOT, FOREIGN, OWN
-from host.sysid.answer.marks import TRUSTED
-from host.sysid.answer.verdict import verdict_of
+from host.sysid.answer import TRUSTED, verdict_of
 from host.sysid.flight.linear_answer import Answer
 from studies.wrong_flights import TRUTH, fly
 

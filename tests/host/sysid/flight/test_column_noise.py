@@ -6,11 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators import fit
 from host.sysid.flight.column_noise import with_column_noise
-from host.sysid.models.equation_file import equations_from
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.templates import Trim
+from host.sysid.models import Maneuver, Trim, equations_from
 
 DT_S, SAMPLES, GYRO, ATTITUDE = 0.04, 100, 0.05, 0.002
 PITCH = equations_from(

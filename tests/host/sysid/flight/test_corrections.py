@@ -18,9 +18,8 @@ from host.sysid.aerodynamics.coefficient_table import (
     coefficient_parts,
     coefficients,
 )
+from host.sysid.answer import true_coefficients, verdict_lines
 from host.sysid.answer.estimate_lines import model_lines
-from host.sysid.answer.truth_comparison import true_coefficients
-from host.sysid.answer.verdict import verdict_lines
 from host.sysid.compatibility.path_preparation import density_share
 from host.sysid.compatibility.reconstruction import (
     Compatibility,
@@ -39,8 +38,8 @@ from host.sysid.flight import linear_answer, linear_model
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.sampling_error import HOLD
 from host.sysid.flight.systematic_errors import add_systematic_covariance, systematic_error_shifts
+from host.sysid.models import Trim, template
 from host.sysid.models.residual_delays import STANDARD_DELAYS
-from host.sysid.models.templates import Trim, template
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.pipeline import flight_preparation
 

@@ -9,19 +9,18 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.cli import main
+from host.sysid.answer import CAREFUL, TRUSTED, verdict_of
 from host.sysid.answer.coefficient_rules import input_feedback
 from host.sysid.answer.feedback_pairs import alike_derivatives, combined_derivatives
-from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.answer.trust_rules import Evidence
-from host.sysid.answer.verdict import verdict_of
-from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+from host.sysid.coefficients import CoefficientAnswer
 from host.sysid.flight.data_finding import Feedback, Finding
 from host.sysid.flight.feedback_findings import feedback_findings
 from host.sysid.flight.flight_tables import read_flight_columns
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.maneuver_detection import detect_maneuvers
 from host.sysid.flight.maneuver_selection import select_maneuvers
-from host.sysid.models.state_space_model import Term
+from host.sysid.models import Term
 from studies.wrong_flights import fly
 
 from tests.host.logs import ROOT

@@ -10,7 +10,7 @@ from host.sysid.flight.filter_step import with_filter_step
 from host.sysid.flight.linear_model import model_and_method
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.flight.reconstructed_flight import FlownManeuver, ReconstructedFlight
-from host.sysid.models.templates import Trim, template
+from host.sysid.models import Trim, template
 from studies.wrong_flights import fly
 
 from tests.host.sysid.at_hand import identify

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from host.arrays import Array
-from host.sysid.answer.verdict import verdict_of
+from host.sysid.answer import verdict_of
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.maneuver_detection import DetectedManeuver
-from host.sysid.models.templates import Trim, template
+from host.sysid.models import Trim, template
 from scipy import signal
 from studies import short_records
 from studies.wrong_flights import NOISE_SD, TRUTH

@@ -18,7 +18,7 @@ from host.sysid.flight.maneuver_selection import (
     overlap_notes,
     select_maneuvers,
 )
-from host.sysid.models.model_file import model_from
+from host.sysid.models import model_from
 
 import host
 from tests.host.sysid.at_hand import identify

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from host.sysid.answer.verdict import verdict_lines
+from host.sysid.answer import verdict_lines
 from host.sysid.flight.flight_tables import read_columns
 from scipy.signal import lsim
 

@@ -5,16 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from host.sysid.answer import verdict_of
 from host.sysid.answer.model_agreement import RELIED_ON
-from host.sysid.answer.verdict import verdict_of
-from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators import fit
 from host.sysid.flight.free_simulation import free_responses
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.noise_model_limits import random_errors
 from host.sysid.flight.prediction_limits import power_freedom, predictions, random_noise
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model_file import model_from
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models import LinearModel, Maneuver, model_from
 from host.sysid.numerics.ar_noise import ArNoise, autocovariance
 from host.sysid.numerics.input_coherence import input_coherence
 from studies.independent import cells, flown

@@ -4,11 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators import fit
 from host.sysid.flight.one_step import one_step_of
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel, Parameter, Term
-from host.sysid.models.templates import Trim, template
+from host.sysid.models import LinearModel, Maneuver, Parameter, Term, Trim, template
 from host.sysid.numerics.output_error_problem import OutputProblem
 
 TRIM = Trim(18.0)

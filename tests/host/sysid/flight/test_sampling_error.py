@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model_file import read_model
+from host.sysid.models import Maneuver, read_model
 from host.sysid.numerics.ar_noise import ArNoise
 from host.sysid.numerics.nonlinear_problem import output_problem
 from scipy import signal

@@ -8,8 +8,7 @@ import numpy as np
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
 from host.sysid.flight.systematic_errors import add_systematic_covariance
 from host.sysid.flight.widest_errors import BESIDE, NOISE, widest_errors
-from host.sysid.models.fit_result import FitResult
-from host.sysid.models.state_space_model import free_model
+from host.sysid.models import FitResult, free_model
 
 
 def _result(variance: list[float]) -> FitResult:

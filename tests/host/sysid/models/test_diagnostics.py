@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import Condition
 from host.sysid import Maneuver, fit
+from host.sysid.answer import answer_document, verdict_lines
 from host.sysid.answer.estimate_lines import model_lines
-from host.sysid.answer.json_document import answer_document
-from host.sysid.answer.verdict import verdict_lines
 from host.sysid.flight.linear_answer import Answer
+from host.sysid.models import Parameter, Term, Trim, model_from
 from host.sysid.models.diagnostics import (
     NOT_IDENTIFIABLE,
     WEAKLY_IDENTIFIABLE,
@@ -23,9 +23,6 @@ from host.sysid.models.diagnostics import (
     whiteness,
 )
 from host.sysid.models.modal_analysis import modes, modes_of
-from host.sysid.models.model_file import model_from
-from host.sysid.models.state_space_model import Parameter, Term
-from host.sysid.models.templates import Trim
 from scipy import signal, stats
 from studies.aircraft import navion, navion_free, navion_structured
 from studies.data import TRUTH, noisy

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 from host.errors import IdentificationError
 from host.sysid.estimators.output_error_fit import fit_output_error
+from host.sysid.models import Maneuver, NonlinearModel, read_model
 from host.sysid.models.equation_text import equation_text
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model_file import read_model
-from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.numerics.nonlinear_problem import NonlinearProblem
 
 TEXT = """\

@@ -8,9 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.arrays import Array
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model_file import read_model
-from host.sysid.models.nonlinear_model import NonlinearModel
+from host.sysid.models import Maneuver, NonlinearModel, read_model
 from host.sysid.numerics.nonlinear_problem import NonlinearProblem
 
 FOLDER = Path(str(files("host.sysid.models").joinpath("equations")))

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from host.arrays import Array
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model_file import model_from
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models import LinearModel, Maneuver, model_from
 from host.sysid.numerics.between_samples import (
     left_between_samples,
     likely_jumps,

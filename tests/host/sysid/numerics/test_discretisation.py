@@ -4,8 +4,8 @@ import warnings
 
 import numpy as np
 import pytest
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import DelayGroup, LinearModel, Parameter, Term
+from host.sysid.models import LinearModel, Maneuver, Parameter, Term
+from host.sysid.models.state_space_model import DelayGroup
 from host.sysid.numerics.ar_noise import ArNoise, ar_filter, autocovariance
 from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.fractional_delay import delay_columns, slope_by_delay

@@ -5,11 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from host.sysid.estimators.method_registry import fit
-from host.sysid.models.equation_file import equations_from
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
-from host.sysid.models.templates import Trim, template
+from host.sysid.estimators import fit
+from host.sysid.models import LinearModel, Maneuver, Trim, equations_from, template
 from host.sysid.numerics.ar_noise import autocovariance
 from host.sysid.numerics.input_coherence import InputCoherence, block_means, input_coherence
 from host.sysid.numerics.input_regressors import input_regressors, lag_knots_s

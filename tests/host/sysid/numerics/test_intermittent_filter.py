@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.arrays import BoolArray
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel, Parameter, Term
+from host.sysid.models import LinearModel, Maneuver, Parameter, Term
 from host.sysid.numerics.filter_problem import FilterProblem, InnovationLikelihood
 from host.sysid.numerics.filter_scoring import (
     fisher_scoring,

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from host.sysid.estimators.output_error_fit import fit_output_error
-from host.sysid.models.equation_file import equations_from
-from host.sysid.models.maneuver import Maneuver
+from host.sysid.models import Maneuver, equations_from
 from host.sysid.numerics.nonlinear_problem import NonlinearProblem
 from scipy import signal
 

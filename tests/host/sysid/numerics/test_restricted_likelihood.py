@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.sysid.estimators.filter_error import fit_filter_error
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel, Parameter, Term
+from host.sysid.models import LinearModel, Maneuver, Parameter, Term
 from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.restricted_likelihood import restricted_slopes
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from host.sysid.models.maneuver import Maneuver
+from host.sysid.models import Maneuver
 from host.sysid.numerics.ar_noise import ArNoise
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.score_variance import variance_ratio

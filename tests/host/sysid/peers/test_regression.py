@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import statsmodels.api as sm
 from host.sysid import FitResult, LinearModel, Maneuver, Parameter, Term, fit
+from host.sysid.estimators import regression_equations
 from host.sysid.estimators.recursive import START_VARIANCE, update
-from host.sysid.estimators.regression import regression_equations
 from host.sysid.estimators.stepwise import F_IN, GAIN_LIMIT, choose_terms
 from host.sysid.models.diagnostics import signal_fits, whiteness
 from scipy import linalg, signal

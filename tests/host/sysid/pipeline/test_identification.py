@@ -14,18 +14,14 @@ import pandas as pd
 import pytest
 from host.cli import main
 from host.errors import HostError
+from host.sysid.answer import MARKS, OutputPaths, read_truth, true_coefficients
 from host.sysid.answer.answer_figures import draw_coefficients
-from host.sysid.answer.marks import MARKS
-from host.sysid.answer.output_files import OutputPaths
-from host.sysid.answer.truth_comparison import read_truth, true_coefficients
-from host.sysid.coefficients.coefficient_model import standard_model
+from host.sysid.coefficients import standard_model
 from host.sysid.flight import maneuver_detection, maneuver_selection
 from host.sysid.flight.linear_estimator import LinearEstimator
-from host.sysid.models.templates import Trim, template
-from host.sysid.pipeline import prepare, read_flight
-from host.sysid.pipeline.identification import Identification
+from host.sysid.models import Trim, template
+from host.sysid.pipeline import Identification, ReadingOptions, prepare, read_flight
 from host.sysid.pipeline.notebook_pictures import Pictures
-from host.sysid.pipeline.reading_options import ReadingOptions
 from matplotlib.figure import Figure
 
 import host
@@ -243,7 +239,7 @@ def test_maneuvers_are_found_once_a_flight(
 
 
 def test_a_stage_adds_and_changes_nothing_before_it(flights: tuple[Path, Path]) -> None:
-    from host.sysid.pipeline.known_aircraft import aircraft_data
+    from host.sysid.pipeline import aircraft_data
 
     known = aircraft_data(NAME)
     flight = prepare(read_flight(flights[0] / "flight.csv", ReadingOptions(), known)).flight

@@ -11,9 +11,8 @@ import pytest
 from host.cli import main
 from host.errors import HostError
 from host.sysid import Maneuver, fit
-from host.sysid.estimators.method_registry import methods
-from host.sysid.models.model_file import model_from
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.estimators import methods
+from host.sysid.models import LinearModel, model_from
 from numpy.typing import NDArray
 from scipy import linalg, optimize
 

@@ -9,9 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.errors import IdentificationError
-from host.sysid.answer.output_files import OutputPaths
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model_file import read_model
+from host.sysid.answer import OutputPaths
+from host.sysid.models import Maneuver, read_model
 from host.sysid.numerics.nonlinear_problem import output_problem
 from scipy import integrate
 

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.errors import IdentificationError
-from host.sysid.models.model_file import model_from, read_model
+from host.sysid.models import model_from, read_model
 from host.sysid.models.model_text import model_text
 from host.sysid.models.thrust_column import ThrustColumn, read_thrust_column
 from host.sysid.pipeline.prediction import THRUST_HELD

@@ -14,7 +14,8 @@ from host.fleet.pages.fleet_page import fleet_page
 from host.fleet.pages.type_prior import type_prior
 from host.fleet.pages.type_text import type_document, type_lines
 from host.fleet.statistics.type_model import TypeModel, type_model
-from host.sysid.answer.atomic_files import atomic_write, file_names
+from host.sysid.answer import atomic_write
+from host.sysid.answer.atomic_files import file_names
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -14,7 +14,7 @@ import numpy as np
 from host.arrays import Array
 from host.instrument.error_sources import error_source
 from host.instrument.instrument_errors import InstrumentErrors
-from host.sysid.coefficients.coefficient_fit import CoefficientFit
+from host.sysid.coefficients import CoefficientFit
 
 _SMALL_SHARE = 1e-4  # of every variance: a loading below it counts as the flight's own
 

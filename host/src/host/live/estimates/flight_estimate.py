@@ -18,8 +18,8 @@ from host.instrument.deviations import SensorErrorModel
 from host.log import read_log
 from host.planning.next_point import INPUT_NAMES, KnownWidth
 from host.planning.predicted_widths import FlightWidth, coefficient_widths
+from host.sysid.coefficients import CoefficientAnswer
 from host.sysid.coefficients.coefficient_estimator import (
-    CoefficientAnswer,
     CoefficientEstimator,
     coefficient_estimator,
 )
@@ -27,7 +27,7 @@ from host.sysid.compatibility.servo_response import surface_positions
 from host.sysid.flight.flight_tables import FlightColumns, read_flight_columns
 from host.sysid.flight.maneuver_detection import DetectedManeuver, detect_maneuvers
 from host.sysid.flight.reconstructed_flight import maneuver_name, reconstruct_flight
-from host.sysid.pipeline.known_aircraft import AircraftData, aircraft_data
+from host.sysid.pipeline import AircraftData, aircraft_data
 from host.sysid.pipeline.surface_travel import with_surface_angles
 from host.twin.testcard.cards import Segment
 from host.twin.testcard.input_shapes import STEPS

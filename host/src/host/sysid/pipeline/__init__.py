@@ -4,6 +4,8 @@
 stages. `predict` flies a saved model over other flights.
 """
 
+from host.faces import lazily
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from host.sysid.pipeline.flight_at_hand import FlightAtHand, at_hand, read_flight
@@ -28,26 +30,21 @@ __all__ = [
     "prepare",
     "read_flight",
 ]
-# Loaded on first use: a name of this room does not cost the imports of all others.
-_HOMES = {
-    "AircraftData": "known_aircraft",
-    "FlightAtHand": "flight_at_hand",
-    "Identification": "identification",
-    "Prediction": "prediction",
-    "ReadingOptions": "reading_options",
-    "aircraft_data": "known_aircraft",
-    "at_hand": "flight_at_hand",
-    "identify": "stages",
-    "identify_columns": "stages",
-    "predict": "prediction",
-    "prepare": "flight_preparation",
-    "read_flight": "flight_at_hand",
-}
 
-
-def __getattr__(name: str) -> object:
-    if name not in _HOMES:
-        raise AttributeError(f"module 'host.sysid.pipeline' has no attribute {name!r}")
-    import importlib
-
-    return getattr(importlib.import_module(f"host.sysid.pipeline.{_HOMES[name]}"), name)
+__getattr__ = lazily(
+    __name__,
+    {
+        "AircraftData": "known_aircraft",
+        "FlightAtHand": "flight_at_hand",
+        "Identification": "identification",
+        "Prediction": "prediction",
+        "ReadingOptions": "reading_options",
+        "aircraft_data": "known_aircraft",
+        "at_hand": "flight_at_hand",
+        "identify": "stages",
+        "identify_columns": "stages",
+        "predict": "prediction",
+        "prepare": "flight_preparation",
+        "read_flight": "flight_at_hand",
+    },
+)
