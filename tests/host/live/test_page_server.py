@@ -69,7 +69,7 @@ def visited(tmp_path: Path, do: Callable[[Visit], Awaitable[None]], *, lan: bool
                 await visit.client.close()
                 session.stop()
                 await runner.cleanup()
-        assert session.error is None
+        assert session.recorder.error is None
         assert session.stream.rows == len([one for one in sent(6.0) if one.is_ident])
 
     asyncio.run(main())

@@ -14,6 +14,7 @@ from typing import Any, Self
 from host.errors import UsageError
 from host.log.capture_head import SUFFIX, CaptureHead, notes_path
 
+_CLOSED = -1  # a number that no file has: who comes late writes into nobody else's
 _SYNC_S = 1.0  # what a computer may lose that loses its power; a program that dies loses nothing
 
 
@@ -58,6 +59,7 @@ class GroundCapture:
             with contextlib.suppress(OSError):  # a disk that is gone was told of when it went
                 os.fsync(file)
             os.close(file)
+        self._bytes = self._notes = _CLOSED
 
     def write(self, data: bytes) -> None:
         """Write bytes; when this returns the system has them.

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from host.aircraft.file import load_measured
-from host.errors import UsageError
+from host.errors import HostError, UsageError
 from host.extras import install_hint
 from host.link.serial import DeviceError
 from host.live.estimates.live_estimates import LiveEstimates, live_estimates
@@ -30,6 +30,7 @@ from host.live.live_stream import LiveStream
 from host.live.logger_learning import LoggerLearning
 from host.live.mavlink_bridge import MavlinkBridge
 from host.live.plotjuggler_bridge import PlotJugglerBridge
+from host.live.recording_watch import RecordingWatch
 from host.live.replay import RADIO_RATE_HZ, replay_source
 from host.live.udp_place import udp_place
 from host.log.capture_head import SUFFIX, CaptureHead
@@ -162,6 +163,7 @@ def run_live(
         In one line: no device, a busy port, a wrong file, a missing extra.
     """
     _check(request)
+    tell = _unfailing(tell)
     calibration = load_calibration(request.calibration)
     source = request.opened or open_source(request, tell)
     own = getattr(source, "calibration_text", "")  # of a virtual instrument
@@ -185,26 +187,13 @@ def run_live(
         estimates = _estimates(request, session, calibration.text if known else "")
         watch = _test_points(request, session, calibration)
         learning = _learning(request, session, estimates, tell, show)
-        try:
+        closing = [one.close for one in (bridge, watch, estimates) if one is not None]
+        with contextlib.ExitStack() as last:  # each is called, whatever another raises
+            for close in (*closing, *reversed(leave), learning.close, session.stop):
+                last.callback(close)
             with contextlib.suppress(KeyboardInterrupt):
-                asyncio.run(_serve(request, session, tell))
-        finally:
-            session.stop()
-            learning.close()
-            for last in leave:
-                last()
-            for listener in (estimates, watch):
-                if listener is not None:
-                    listener.close()
-            if bridge is not None:
-                bridge.close()
-    if session.error is not None:
-        raise session.error
-    if session.disk_error is not None and capture is not None:
-        raise UsageError(
-            f"{capture.path}: the disk took {capture.size_bytes} bytes and no more"
-            f" ({session.disk_error.strerror}); what is there can be decoded"
-        )
+                _receive(request, session, tell)
+    _raise_error(session, capture)
     stream = session.stream
     return LiveSummary(
         capture.path if capture else None,
@@ -212,6 +201,48 @@ def run_live(
         stream.rows,
         stream.lost,
     )
+
+
+def _unfailing(tell: Callable[[str], None]) -> Callable[[str], None]:
+    """Return the same for a terminal that may have gone."""
+
+    def told(text: str) -> None:
+        with contextlib.suppress(Exception):
+            tell(text)
+
+    return told
+
+
+def _receive(request: LiveRequest, session: LiveSession, tell: Callable[[str], None]) -> None:
+    """Receive until the end; a mistake beside the recorder ends the page, never the recording."""
+    watch = RecordingWatch(session, tell)
+    try:
+        asyncio.run(_serve(request, session, watch, tell))
+    except HostError:
+        raise
+    except Exception as error:
+        if not session.recorder.listening:
+            raise
+        tell(
+            f"internal error: {type(error).__name__}: {error}; the page has ended, the recording"
+            " goes on; Ctrl-C ends it"
+        )
+        with contextlib.suppress(KeyboardInterrupt):
+            while not session.recorder.ended.wait(_POLL_S):
+                watch.look()
+        raise
+
+
+def _raise_error(session: LiveSession, capture: GroundCapture | None) -> None:
+    """Raise what ended the recording before its time."""
+    recorder = session.recorder
+    if recorder.error is not None:
+        raise recorder.error
+    if recorder.disk_error is not None and capture is not None:
+        raise UsageError(
+            f"{capture.path}: the disk took {capture.size_bytes} bytes and no more"
+            f" ({recorder.disk_error.strerror}); what is there can be decoded"
+        )
 
 
 def _estimates(
@@ -288,27 +319,35 @@ def _capture(
     return GroundCapture(path if path.suffix else path.with_suffix(SUFFIX), head)
 
 
-async def _serve(request: LiveRequest, session: LiveSession, tell: Callable[[str], None]) -> None:
+async def _serve(
+    request: LiveRequest,
+    session: LiveSession,
+    watch: RecordingWatch,
+    tell: Callable[[str], None],
+) -> None:
     """Show the page, or only receive, until the end."""
     runner = None
     try:
         if request.page:
-            runner = await _page(request, session, tell)
+            runner = await _page(request, session, watch, tell)
         session.start()
-        await _until_ended(session, tell, forever=request.page)
+        await _until_ended(session, watch, tell, forever=request.page)
         await _until_estimated(session)
     finally:
         if runner is not None:
             await runner.cleanup()
 
 
-async def _until_ended(session: LiveSession, tell: Callable[[str], None], *, forever: bool) -> None:
+async def _until_ended(
+    session: LiveSession, watch: RecordingWatch, tell: Callable[[str], None], *, forever: bool
+) -> None:
     """Wait; say once when nothing understood has come for a while."""
     loop = asyncio.get_running_loop()
     began_s, said = loop.time(), False
-    while session.error is None and (forever or not session.ended.is_set()):
+    while session.recorder.error is None and (forever or not session.ended.is_set()):
         if session.enough.is_set():
-            return
+            break
+        watch.look()
         await asyncio.sleep(_POLL_S)
         received = session.stream.rows or session.stream.frames
         if (
@@ -319,6 +358,7 @@ async def _until_ended(session: LiveSession, tell: Callable[[str], None], *, for
         ):
             said = True
             tell(_silence(session))
+    watch.look()
 
 
 async def _until_estimated(session: LiveSession) -> None:
@@ -326,7 +366,11 @@ async def _until_estimated(session: LiveSession) -> None:
     loop = asyncio.get_running_loop()
     end_s = loop.time() + _LAST_S
     estimates = session.listeners.get("estimates")
-    if isinstance(estimates, LiveEstimates) and session.audiences and session.error is None:
+    if (
+        isinstance(estimates, LiveEstimates)
+        and session.audiences
+        and session.recorder.error is None
+    ):
         while not estimates.idle and loop.time() < end_s:
             await asyncio.sleep(_POLL_S)
         await asyncio.sleep(2.0 * _STATE_S)
@@ -348,7 +392,10 @@ def _silence(session: LiveSession) -> str:
 
 
 async def _page(
-    request: LiveRequest, session: LiveSession, tell: Callable[[str], None]
+    request: LiveRequest,
+    session: LiveSession,
+    watch: RecordingWatch,
+    tell: Callable[[str], None],
 ) -> web.AppRunner:
     try:
         from aiohttp import web
@@ -362,7 +409,9 @@ async def _page(
     listener = _listener(request)
     port = listener.getsockname()[1]
     guard = PageGuard(port, tuple(own_addresses()) if request.lan else ())
-    runner = web.AppRunner(PageServer(session, guard).application(), access_log=None)
+    server = PageServer(session, guard)
+    watch.say = server.recording
+    runner = web.AppRunner(server.application(), access_log=None)
     await runner.setup()
     await web.SockSite(runner, listener, backlog=256).start()
     tell(f"page: http://127.0.0.1:{port}/?token={guard.pilot_token}")

@@ -1,30 +1,33 @@
-"""The one loop of `host live`: bytes to disk, then to the stream, then to whoever looks.
+"""What `host live` shows: bytes that are on disk, through the stream, to whoever looks.
 
-It runs in a thread of its own: no viewer, bridge or page can hold it up.
+It runs in a thread of its own, beside the recorder's: nothing here can hold up or end a recording.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import queue
 import threading
 import time
+import traceback
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 import numpy as np
 
-from host.errors import HostError
 from host.live.flight_state import FlightState
 from host.live.ground_capture import GroundCapture
 from host.live.live_sample import LIVE_UNITS, LiveUpdate
 from host.live.live_sources import Source
 from host.live.live_stream import LiveStream
+from host.live.recorder import Recorder
 
 _BATCH_S = 0.016  # half a redraw of the page
 _STATE_S = 0.2
 _REST_S = 0.05
 _BIG = 1 << 14
+_LEAVE_S = 5.0
 
 
 class Audience(Protocol):
@@ -56,7 +59,7 @@ class Listener(Protocol):
 
 
 class LiveSession:
-    """Receives a source until it ends or is told to.
+    """Shows a source until it ends or is told to; `recorder` has each byte on disk before.
 
     Parameters
     ----------
@@ -77,161 +80,150 @@ class LiveSession:
     ) -> None:
         self.source = source
         self.stream = stream
-        self.capture = capture
+        self.recorder = Recorder(source, capture)
         self.state = FlightState(stream)
         self.audiences: list[Audience] = []
         self.listeners: dict[str, Listener] = {}
-        self.ended = threading.Event()
+        self.ended = threading.Event()  # all that came is shown
         self.enough = threading.Event()  # set by who has what it wanted: the program may end
-        self.asked: dict[str, Callable[[dict[str, Any]], None]] = {}  # by type; who answers
-        self.error: BaseException | None = None
-        self.disk_error: OSError | None = None  # from then on nothing is recorded
+        self.asked: dict[str, Callable[[dict[str, Any]], None]] = {"mark": self._mark}
+        self.beat_s = time.monotonic()  # when the thread that shows last went on
         self._asked: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
         self._stop = threading.Event()
         self._tell = tell
         self._marks = 0
-        self._mistake: Exception | None = None
+        self._shown_s = 0.0
+        self._mistaken: set[str] = set()
         self._thread = threading.Thread(target=self._run, name="host live", daemon=True)
+        stream.safely = self._safely
+
+    @property
+    def capture(self) -> GroundCapture | None:
+        """Where the bytes go; None where they go nowhere, or nowhere any more."""
+        recorder = self.recorder
+        return recorder.capture if recorder.disk_error is None else None
 
     def start(self) -> None:
         """Begin to receive."""
+        self.recorder.start()
         self._thread.start()
 
     def stop(self) -> None:
-        """End receiving, and wait until the last byte is on disk."""
+        """End receiving, and wait until the last byte is on disk and, if it can be, shown."""
+        self.recorder.stop()
         self._stop.set()
         if self._thread.is_alive():
-            self._thread.join()
+            self._thread.join(_LEAVE_S)
 
     def mark(self, who: str) -> None:
         """Note an event of the ground; it stands in the capture, never on the card."""
         self.ask({"type": "mark", "who": who})
 
     def ask(self, what: dict[str, Any]) -> None:
-        """Ask for something; it is answered in the session's thread."""
+        """Ask for something by its ``type``; whoever is in `asked` answers, in this thread."""
         self._asked.put(what)
 
     def note(self, kind: str, **what: Any) -> None:
-        """Write a note into the capture, where there is one; in the session's thread."""
+        """Write a note into the capture, where there is one."""
         if self.capture is not None:
             self.capture.note(kind, **what)
 
-    def _run(self) -> None:
-        try:
-            self._receive()
-        except (HostError, OSError) as error:
-            self.error = error
-        finally:
-            self.ended.set()
-        while self.error is None and not self._stop.wait(_REST_S):
-            self._answer()
-            self._safely(self._show_state)
+    def judged(self, verdict: Mapping[str, Any]) -> None:
+        """Note the verdict of a test point, in the thread that feeds."""
+        self.state.say("verdict", f"point {verdict['point']}: {verdict['text']}")
+        self.note("verdict", **verdict)
 
-    def _receive(self) -> None:
+    def _run(self) -> None:
         held = bytearray()
-        fed_s = self._shown_s = 0.0
+        fed_s = time.monotonic()
         arrived_s = 0.0  # of the first byte held
-        for data in self.source.portions(self._said):
-            if data and self.capture is not None:
-                self._written(self.capture, data)
-            arrived_s = arrived_s if held else time.time()
-            held += data
-            now_s = time.monotonic()
-            if held and (now_s - fed_s >= _BATCH_S or len(held) >= _BIG):
+        while not (self._stop.is_set() and self.ended.is_set()):
+            last = self.recorder.ended.is_set()  # asked before: what is taken then is all
+            portion = self.recorder.take(_REST_S if not held else _BATCH_S)
+            now_s = self.beat_s = time.monotonic()
+            if portion is not None:
+                arrived_s = arrived_s if held else portion.arrived_s
+                held += portion.data
+            due = now_s - fed_s >= _BATCH_S or len(held) >= _BIG or portion is None
+            if held and due:
                 self._safely(self._feed, bytes(held), arrived_s)
                 held.clear()
                 fed_s = now_s
-            self._answer()
+            if portion is not None and portion.text:
+                self._safely(self._said, portion.text)
+            self._safely(self._answer)
             self._safely(self._show_state)
-            if self._stop.is_set():
-                break
-        if held:
-            self._safely(self._feed, bytes(held), arrived_s)
+            if last and portion is None:
+                self.ended.set()
 
     def _safely(self, show: Callable[..., None], *given: Any) -> None:
-        """Show something; a mistake of ours in it is told once and never ends the recording."""
+        """Call what shows or judges; a mistake in it is told once and costs nobody else."""
         try:
             show(*given)
-        except Exception as error:
-            if self._mistake is None:
-                self._mistake = error
+        except BaseException as error:  # an exit that somebody asked for here is a mistake too
+            where = str(traceback.extract_tb(error.__traceback__)[-1])
+            if where in self._mistaken:
+                return
+            self._mistaken.add(where)
+            with contextlib.suppress(Exception):
                 self._said(
                     f"internal error: {type(error).__name__}: {error}; the page may be wrong, the"
                     " recording goes on (please report it)"
                 )
 
-    def _written(self, capture: GroundCapture, data: bytes) -> None:
-        """Write to disk; if it takes no more, say so and go on showing the flight."""
-        try:
-            capture.write(data)
-        except OSError as error:
-            self.capture = None
-            self.disk_error = error
-            self._said(
-                f"{capture.path} takes no more ({error.strerror}): NOT RECORDED from here on"
-            )
-
     def _feed(self, data: bytes, arrived_s: float) -> None:
         update = self.stream.feed(data, arrived_s)
         self.state.received(len(data), update)
         for listener in self.listeners.values():
-            listener.take(data)
+            self._safely(listener.take, data)
         for text in update.messages:
-            self._noted("warning", text)
             self._tell(text)
+            self.note("warning", text=text)
         if len(update) and self.audiences:
             message = rows_message(update)
             for audience in self.audiences:
-                audience.rows(message)
-
-    def judged(self, verdict: Mapping[str, Any]) -> None:
-        """Note the verdict of a test point, in the thread that feeds."""
-        self.state.say("verdict", f"point {verdict['point']}: {verdict['text']}")
-        if self.capture is not None:
-            self.capture.note("verdict", **verdict)
+                self._safely(audience.rows, message)
 
     def _said(self, text: str) -> None:
         self._tell(text)
-        self._noted("line", text)
         self.state.say("line", text)
-
-    def _noted(self, kind: str, text: str) -> None:
-        if self.capture is not None:
-            self.capture.note(kind, text=text)
+        self.note("line", text=text)
 
     def _answer(self) -> None:
         while not self._asked.empty():
-            asked = self._asked.get()
-            if asked["type"] in self.asked:
-                self._safely(self.asked[asked["type"]], asked)
-                continue
-            self._marks += 1
-            row = self.state.say("mark", f"mark {self._marks}")
-            if self.capture is not None:
-                self.capture.note("mark", number=self._marks, t_s=row["t_s"], who=asked["who"])
+            what = self._asked.get()
+            answer = self.asked.get(str(what.get("type")))
+            if answer is not None:  # else nobody here: a preflight's word without a preflight
+                self._safely(answer, what)
+
+    def _mark(self, what: dict[str, Any]) -> None:
+        self._marks += 1
+        row = self.state.say("mark", f"mark {self._marks}")
+        self.note("mark", number=self._marks, t_s=row["t_s"], who=what["who"])
 
     def _show_state(self) -> None:
         now_s = time.monotonic()
         if now_s - self._shown_s < _STATE_S or not self.audiences:
             return
         self._shown_s = now_s
-        for listener in self.listeners.values():
-            listener.tick()
-        capture = self.capture
         what = self.state.as_json() | {
             "type": "state",
             "ended": self.ended.is_set(),
             "source": self.source.name,
-            "captured_bytes": capture.size_bytes if capture else None,
-            "capture": capture.path.name if capture else None,
-            "not_recorded": self.disk_error is not None,
+            "captured_bytes": self.capture.size_bytes if self.capture else None,
+            "capture": self.capture.path.name if self.capture else None,
+            "not_recorded": self.recorder.trouble(),
         }
-        what |= {name: listener.as_json() for name, listener in self.listeners.items()}
+        for name, listener in self.listeners.items():
+            self._safely(_add, what, name, listener)
         message = json.dumps(what, allow_nan=False)
         for audience in self.audiences:
-            audience.state(message)
+            self._safely(audience.state, message)
 
-    _shown_s = 0.0
+
+def _add(what: dict[str, Any], name: str, listener: Listener) -> None:
+    listener.tick()
+    what[name] = listener.as_json()
 
 
 def rows_message(update: LiveUpdate) -> bytes:

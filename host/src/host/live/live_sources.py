@@ -19,7 +19,7 @@ from host.errors import UsageError
 from host.link.serial import BAUD, DeviceError, SerialLink, SerialPort, serial_ports
 
 RADIO_BAUD = 57600  # firmware/settings.toml: telemetry_baud
-_WAIT_S = 0.05
+_WAIT_S = 0.05  # between two portions, at most
 _AGAIN_S = 0.5
 _RADIO_CHIPS = ("FT232", "CP2102")  # of XBee adapters; CH340 is that of Mega clones
 _DATAGRAM = 65536
@@ -85,7 +85,7 @@ class PortSource:
                     tell(f"{self.name} went away; waiting for it, what came is on disk")
             while True:
                 yield b""
-                time.sleep(_AGAIN_S)
+                yield from silence(time.monotonic() + _AGAIN_S)
                 with contextlib.suppress(DeviceError):
                     link = SerialLink(self.name, self.baud)
                     break
@@ -140,6 +140,13 @@ class UdpSource:
                     yield listener.recv(_DATAGRAM)
                 except TimeoutError:
                     yield b""
+
+
+def silence(until_s: float) -> Iterator[bytes]:
+    """Wait for a time on the clock of `time.monotonic`, and yield nothing often enough."""
+    while (wait_s := until_s - time.monotonic()) > 0.0:
+        time.sleep(min(_WAIT_S, wait_s))
+        yield b""
 
 
 def choose_radio(ports: list[SerialPort]) -> SerialPort:

@@ -47,9 +47,15 @@ class LiveStream:
         Counts to SI.
     texts : collection of bytes
         Schemas known beside the released ones.
+
+    Attributes
+    ----------
+    safely : callable
+        Calls a consumer with an update; a session's own keeps a mistake in one from the others.
     """
 
     def __init__(self, calibration: Calibration, texts: Collection[bytes] = ()) -> None:
+        self.safely: Callable[[Consumer, LiveUpdate], None] = lambda one, update: one(update)
         self.calibration = calibration
         self.schema: Schema | None = None
         self.frames = 0
@@ -117,7 +123,7 @@ class LiveStream:
                 self.rows += len(text)
                 update = text
         for consumer in self._consumers:
-            consumer(update)
+            self.safely(consumer, update)
         return update
 
     def _status(self) -> StatusLine | None:

@@ -42,7 +42,7 @@ class Viewer:
         self.skipped = 0
         self.track_sent = 0
         self._rows: deque[bytes] = deque(maxlen=_QUEUE)
-        self._state: str | None = None
+        self._states: dict[str, str] = {}
         self._wake = asyncio.Event()
         self._marked_s = 0.0
 
@@ -52,9 +52,9 @@ class Viewer:
         self._rows.append(message)
         self._wake.set()
 
-    def state(self, message: str) -> None:
-        """Queue the newest state."""
-        self._state = message
+    def state(self, message: str, kind: str = "state") -> None:
+        """Queue the newest of a kind: a state, or the recorder's heartbeat."""
+        self._states[kind] = message
         self._wake.set()
 
     def may_mark(self, now_s: float) -> bool:
@@ -71,8 +71,8 @@ class Viewer:
             self._wake.clear()
             while self._rows:
                 await self.socket.send_bytes(self._rows.popleft())
-            state, self._state = self._state, None
-            if state is not None:
+            states, self._states = self._states, {}
+            for state in states.values():
                 await self.socket.send_str(state)
 
 
@@ -111,6 +111,11 @@ class PageServer:
     def state(self, message: str) -> None:
         """Take the state from the session's thread."""
         self._call(self._state, message)
+
+    def recording(self, message: str) -> None:
+        """Take the recorder's heartbeat, in the loop that serves."""
+        for viewer in self._viewers:
+            viewer.state(message, "recording")
 
     def _call(self, function: Any, message: Any) -> None:
         if not self._loop.is_closed():

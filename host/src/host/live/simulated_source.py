@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Self
 
-from host.live.live_sources import Tell
+from host.live.live_sources import Tell, silence
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.outcome.virtual_calibration import calibration
 from host.twin.recorder import sitl
@@ -91,8 +91,6 @@ class SimulatedSource:
         for sent in radio(
             given, rate_hz=rate_hz, aircraft=record.aircraft.name, flight_card=self.flight_card
         ):
-            wait_s = start_s + sent.t_s - time.monotonic()
-            if wait_s > 0.0:
-                time.sleep(wait_s)
+            yield from silence(start_s + sent.t_s)
             yield sent.data
         tell(f"the flight of {self.card} is over")

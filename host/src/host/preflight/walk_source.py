@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from host.aircraft.file import Aircraft
 from host.errors import UsageError
-from host.live.live_sources import SPEED, Tell
+from host.live.live_sources import SPEED, Tell, silence
 from host.near_names import like
 from host.twin.ground.ground_faults import GROUND_FAULTS, GroundFault, broken_walk
 from host.twin.ground.ground_instrument import START_US, ground_frames
@@ -58,9 +58,7 @@ class WalkSource:
         for at_us, data in frames.timed():
             while windows and at_us >= windows[0][0]:
                 tell(f"the hands: {windows.pop(0)[1].replace('_', ' ')}")
-            wait_s = begin_s + (at_us - START_US) * 1e-6 / self.speed - time.monotonic()
-            if wait_s > 0.0:
-                time.sleep(wait_s)
+            yield from silence(begin_s + (at_us - START_US) * 1e-6 / self.speed)
             yield data
         tell("the walk is over")
 

@@ -2,7 +2,7 @@
 
 const AGAIN_MS = 1000;
 
-export function connect({ onHello, onRows, onState, onClosed }) {
+export function connect({ onHello, onRows, onState, onRecording, onClosed }) {
   const url = new URL("ws", location.href);
   url.protocol = "ws:";
   url.search = "";
@@ -19,6 +19,7 @@ export function connect({ onHello, onRows, onState, onClosed }) {
       const said = JSON.parse(event.data);
       if (said.type === "hello") onHello(said);
       else if (said.type === "state") onState(said);
+      else if (said.type === "recording") onRecording(said);
     };
     socket.onclose = () => {
       onClosed();

@@ -13,6 +13,7 @@ import { Verdict } from "./verdict.js";
 
 const REDRAW_MS = 1000 / 30;
 const OLD_S = 1;
+const BEAT_S = 4; // the recorder's heartbeat comes every second
 const GAPS = 4000; // latencies kept for the bench
 
 const byId = (id) => document.getElementById(id);
@@ -24,6 +25,8 @@ let history = null;
 let plots = null;
 let state = null;
 let stateAt = -Infinity;
+let recording = { bytes: null, trouble: "" };
+let recordingAt = -Infinity;
 let marked = 0;
 let connected = false;
 let wasOld = false;
@@ -35,6 +38,7 @@ const server = connect({
     byId("mark").hidden = !hello.may_mark;
     preflight.allow(hello.may_mark);
     connected = true;
+    recordingAt = performance.now();
     plan.points = [];
   },
   onRows(numbers) {
@@ -56,6 +60,10 @@ const server = connect({
     if (marks > marked) sound.play([660]);
     marked = marks;
   },
+  onRecording(said) {
+    recording = said;
+    recordingAt = performance.now();
+  },
   onClosed() {
     connected = false;
   },
@@ -70,8 +78,10 @@ function ageS() {
 
 function banner(age) {
   if (!connected) return "host live has ended, or this page lost it: nothing here is new";
+  if (recording.trouble) return `${recording.trouble} (the card goes on)`;
+  const beatS = (performance.now() - recordingAt) / 1000;
+  if (beatS > BEAT_S) return `no word of the ground's recording for ${beatS.toFixed(0)} s (the card goes on)`;
   if (state === null) return "";
-  if (state.not_recorded) return "the disk takes no more: NOT RECORDED on the ground (the card goes on)";
   if (state.ended) return "the source has ended: nothing here is new";
   if (age === null) return "nothing received yet";
   return age > OLD_S ? `no data for ${age.toFixed(0)} s: values are old` : "";

@@ -39,7 +39,7 @@ export function showState(state) {
 
 function showFacts(state, link, system) {
   const list = document.createDocumentFragment();
-  const captured = state.captured_bytes === null ? "a replay: none" : `${(state.captured_bytes / 1000).toFixed(1)} kB`;
+  const captured = state.not_recorded ? "NOT RECORDED" : state.captured_bytes === null ? "a replay: none" : `${(state.captured_bytes / 1000).toFixed(1)} kB`;
   fact(list, "ground capture", captured);
   fact(list, "rows, lost", `${link.rows}, ${link.lost}`);
   fact(list, "bytes/s, damaged", `${link.bytes_per_s}, ${link.damaged_bytes}`, link.damaged_bytes > 0);
