@@ -13,7 +13,7 @@ from host.readers.dataflash_messages import WANTED
 from host.readers.dataflash_text import read_text_records
 from host.readers.log_formats import format_of_file
 from host.readers.tlog_messages import read_tlog
-from host.readers.ulog_walk import walk
+from host.readers.ulog_binary import SAID, read_content
 
 from tests.host.readers.autopilot_flights import rows_of, write
 
@@ -64,27 +64,33 @@ def test_the_text_form_is_the_binary_one(tmp_path: Path) -> None:
             np.testing.assert_allclose(text.tables[name][column], values, rtol=1e-9)
 
 
-def test_ulog_is_whole_for_pyulog(tmp_path: Path) -> None:
+def test_ulog_is_what_pyulog_reads(tmp_path: Path) -> None:
+    """Our own log and two of PX4: topics, columns, values, parameters, damage."""
     from pyulog import ULog
 
-    path = write("ulog", tmp_path)
-    log = ULog(str(path))
-    assert not log.file_corruption
-    assert not log.dropouts
-    assert log.initial_parameters["CA_SV_CS_COUNT"] == 4
-    assert log.msg_info_dict["sys_name"] == "PX4"
-    servos = log.get_dataset("actuator_servos").data
+    folder = Path(__file__).parents[2] / "data" / "px4"
+    own = write("ulog", tmp_path)
+    for path in (own, *sorted(folder.glob("*.ulg"))):
+        theirs = ULog(str(path))
+        ours = read_content(path, lambda name: True, lambda name, column: True)
+        assert (ours.strange, ours.rest, ours.refused) == (0, 0, {}), path
+        assert (ours.dropouts, ours.dropped_ms) == (
+            len(theirs.dropouts), sum(one.duration for one in theirs.dropouts),
+        )  # fmt: skip
+        assert ours.parameters == {k: float(v) for k, v in theirs.initial_parameters.items()}
+        assert ours.said == {k: v for k, v in theirs.msg_info_dict.items() if k in SAID}
+        found = {(t.name, t.instance): t for t in ours.topics if t.data}
+        assert len(found) == len(theirs.data_list) > 5
+        for data in theirs.data_list:
+            topic = found[data.name, data.multi_id]
+            theirs_of = {k: v for k, v in data.data.items() if "_padding" not in k}
+            assert set(topic.columns) == set(theirs_of), data.name
+            for name, values in theirs_of.items():
+                column = topic.column(name)
+                np.testing.assert_array_equal(column, values.astype(column.dtype))
+    servos = ULog(str(own)).get_dataset("actuator_servos").data
     assert np.isnan(servos["control[7]"]).all()
     assert np.nanmax(np.abs(servos["control[2]"])) > 0.1
-    found = walk(path)
-    assert (found.strange, found.rest) == (0, 0)
-
-
-def test_ulog_of_others_is_walked_whole() -> None:
-    folder = Path(__file__).parents[2] / "data" / "px4"
-    for path in folder.glob("*.ulg"):
-        found = walk(path)
-        assert (found.strange, found.rest) == (0, 0), path
 
 
 def test_tlog_is_what_mavutil_reads(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from host.errors import UsageError
 from host.extras import install_hint
 from host.readers.autopilot_log import FORMATS, AutopilotLog, NotAutopilotLogError
 from host.readers.dataflash_messages import read_dataflash
+from host.readers.ulog_messages import read_ulog
 
 HEAD_BYTES = 4096
 ULOG_MAGIC = b"ULog\x01\x12\x35"
@@ -63,11 +64,9 @@ def read_messages(path: Path) -> AutopilotLog:
     kind = format_of_file(path)
     if kind is None:
         raise NotAutopilotLogError(f"{path}: no {', '.join(FORMATS.values())}")
+    if kind == "ulog":
+        return read_ulog(path)
     try:
-        if kind == "ulog":
-            from host.readers.ulog_messages import read_ulog
-
-            return read_ulog(path)
         if kind == "tlog":
             from host.readers.tlog_messages import read_tlog
 

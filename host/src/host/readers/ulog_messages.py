@@ -1,20 +1,15 @@
-"""PX4 ULog by pyulog, with checks that pyulog lacks: where messages stop, impossible values."""
+"""PX4 ULog as messages: which topics and columns are read, and when they were sampled."""
 
 from __future__ import annotations
 
-import contextlib
-import io
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from host.files.watched import watched_file
 from host.readers.autopilot_log import AutopilotLog, Messages, NotAutopilotLogError
 from host.readers.plausible_times import plausible_times
-from host.readers.ulog_walk import walk
+from host.readers.ulog_binary import SAID, Topic, ULogContent, UnknownFlagsError, read_content
 
 WANTED = (
     "sensor_combined", "vehicle_angular_velocity", "vehicle_acceleration", "vehicle_attitude",
@@ -30,6 +25,7 @@ LARGE = {
     "vehicle_angular_velocity": ("xyz",), "vehicle_acceleration": ("xyz",),
 }  # fmt: skip
 OUTPUTS = ("actuator_servos", "actuator_motors")
+STAMPS = ("timestamp", "timestamp_sample")
 # vehicle_status.vehicle_type, and MAV_TYPE of MAVLink's common.xml.
 BY_STATUS = {1: "copter", 2: "plane", 3: "rover", 4: "airship"}
 BY_MAV_TYPE = {
@@ -45,90 +41,78 @@ def read_ulog(path: Path) -> AutopilotLog:
     Raises
     ------
     NotAutopilotLogError
-        If pyulog finds no message in it.
-    ModuleNotFoundError
-        If pyulog is missing.
+        If there is no message in it that is read.
     """
-    from pyulog import ULog
-
     try:
-        # It prints what it does not know, and leaves a file open that it cannot read.
-        with watched_file(path) as file, contextlib.redirect_stdout(io.StringIO()):
-            log = ULog(file, list(WANTED), disable_str_exceptions=True)
-    except Exception as error:  # pyulog names no common ancestor of what damaged files raise
+        log = read_content(path, WANTED.__contains__, _read)
+    except UnknownFlagsError:
         raise NotAutopilotLogError(
-            f"{path}: pyulog cannot read it ({type(error).__name__}: {str(error)[:80]}); is the"
-            " file cut in its head or overwritten?"
+            f"{path}: its flags name a way of reading that this program does not know; is it"
+            " damaged, or of a newer PX4?"
         ) from None
-    damage, lost = _damage(path, log)
+    damage, lost = _damage(log)
     messages = _messages(log, damage)
-    parameters = {
-        str(k): float(v) for k, v in log.initial_parameters.items() if isinstance(v, int | float)
-    }
-    said = {str(k): str(v) for k, v in log.msg_info_dict.items() if isinstance(v, str)}
-    if not messages and not parameters:
+    if not messages and not log.parameters:
         raise NotAutopilotLogError(
             f"{path}: begins as a ULog but holds no message that is known; is it cut?"
         )
-    firmware = " ".join(said[k] for k in ("sys_name", "ver_sw_branch", "ver_hw") if k in said)
     return AutopilotLog(
         path=path,
         format="ulog",
         autopilot="px4",
-        vehicle=_vehicle(messages, parameters),
-        firmware=firmware,
+        vehicle=_vehicle(messages, log.parameters),
+        firmware=" ".join(log.said[k] for k in SAID if k in log.said),
         messages=messages,
-        parameters=parameters,
+        parameters=log.parameters,
         damage=tuple(damage),
         lost=lost,
     )
 
 
-def _damage(path: Path, log: Any) -> tuple[list[str], int]:
-    said, lost = [], 0
-    found = walk(path)
-    if found.strange:
+def _damage(log: ULogContent) -> tuple[list[str], int]:
+    said = []
+    if log.strange:
         said.append(
-            f"{found.strange} bytes from byte {found.strange_at} on are no messages: the format has"
+            f"{log.strange} bytes from byte {log.strange_at} on are no messages: the format has"
             " no checksum, messages before and after may be wrong too"
         )
-        lost += 1
-    if found.rest:
-        said.append(f"its last message is cut after {found.rest} bytes: the log is truncated")
-        lost += 1
-    if log.file_corruption and not found.strange:
-        said.append("pyulog met messages that it could not read")
+    if log.rest:
+        said.append(f"its last message is cut after {log.rest} bytes: the log is truncated")
+    lost = len(said)
+    if log.refused:
+        first = next(iter(log.refused.values()))
+        said.append(f"{len(log.refused)} definitions are not followed, the first: {first}")
         lost += 1
     if log.dropouts:
-        gone_ms = sum(d.duration for d in log.dropouts)
-        said.append(f"the card was too slow {len(log.dropouts)} times: {gone_ms} ms are missing")
-        lost += len(log.dropouts)
+        said.append(f"the card was too slow {log.dropouts} times: {log.dropped_ms} ms are missing")
+        lost += log.dropouts
     return said, lost
 
 
-def _messages(log: Any, damage: list[str]) -> dict[str, dict[int, Messages]]:
-    """Return the messages of each topic; what pyulog holds of it is given up, small ones first.
+def _messages(log: ULogContent, damage: list[str]) -> dict[str, dict[int, Messages]]:
+    """Return the messages of each topic; what was read of it is given up, small ones first.
 
     A gigabyte is in memory once, and of a topic only what is read is there twice.
     """
     found: dict[str, dict[int, Messages]] = {}
-    log.data_list.sort(key=lambda data: sum(v.nbytes for v in data.data.values()), reverse=True)
-    while log.data_list:
-        data = log.data_list.pop()
-        name, instance = str(data.name), int(data.multi_id)
-        messages = _topic(name, data.data, damage)
+    log.topics.sort(key=lambda topic: len(topic.data), reverse=True)
+    while log.topics:
+        topic = log.topics.pop()
+        messages = _topic(topic, damage)
         if messages is not None:
-            found.setdefault(name, {})[instance] = messages
+            found.setdefault(topic.name, {})[topic.instance] = messages
     return dict(sorted(found.items()))
 
 
-def _topic(name: str, data: Mapping[str, NDArray[Any]], damage: list[str]) -> Messages | None:
-    """Return the messages of one topic, copied."""
-    stamps = data.get("timestamp")
-    if stamps is None or not len(stamps):
+def _topic(topic: Topic, damage: list[str]) -> Messages | None:
+    """Return the messages of one topic, column by column."""
+    name, columns = topic.name, topic.columns
+    if "timestamp" not in columns or not topic.data:
         return None
-    sampled = data.get("timestamp_sample")
-    use = sampled if sampled is not None and (sampled > 0).mean() > 0.9 else stamps
+    use = topic.column("timestamp")
+    if "timestamp_sample" in columns:
+        sampled = topic.column("timestamp_sample")
+        use = sampled if (sampled > 0).mean() > 0.9 else use
     t_s = np.asarray(use, dtype=np.float64) * 1e-6
     kept, wrong = plausible_times(t_s)
     if wrong:
@@ -138,22 +122,21 @@ def _topic(name: str, data: Mapping[str, NDArray[Any]], damage: list[str]) -> Me
     rows = rows[np.concatenate([[True], np.diff(t_s[rows]) > 0.0])] if len(rows) else rows
     if not len(rows):
         return None
+    every: Any = slice(None) if len(rows) == len(t_s) else rows  # then nothing is copied
     own = {}
-    for key, values in data.items():
-        if len(values) != len(stamps) or not _read(name, str(key)):
+    for key in columns:
+        if key in STAMPS:
             continue
-        column = values[rows]
+        column = topic.column(key)[every]
         # Outputs that nothing is assigned to are most of them.
         if name not in OUTPUTS or not np.isnan(column).all():
-            own[str(key)] = column
-    return Messages(t_s[rows], own)
+            own[key] = column
+    return Messages(t_s[every], own)
 
 
 def _read(name: str, key: str) -> bool:
-    """Return whether a field is read: of large topics only some are."""
-    if name in LARGE:
-        return key.partition("[")[0] in LARGE[name]
-    return key not in ("timestamp", "timestamp_sample")
+    """Return whether a column is read: of large topics only some are."""
+    return key in STAMPS or name not in LARGE or key.partition("[")[0] in LARGE[name]
 
 
 def _vehicle(messages: dict[str, dict[int, Messages]], parameters: dict[str, float]) -> str:
