@@ -332,8 +332,10 @@ void Sensors::gps_readings(core::InputReadings* out) const {
   const frames::GpsFrame& gps = gps_.frame();
   out->latitude = gps.latitude;
   out->longitude = gps.longitude;
-  out->gps = gps_present_ && gps.fix >= static_cast<uint8_t>(frames::GpsFix::kFix2d) &&
-             gps.latitude != frames::kGpsLatitudeInvalid &&
+  const bool fix = gps_present_ && gps.fix >= static_cast<uint8_t>(frames::GpsFix::kFix2d);
+  const bool speed = fix && gps.ground_speed != frames::kGpsGroundSpeedInvalid;
+  out->ground_speed_cmps = speed ? gps.ground_speed : uint16_t{0};
+  out->gps = fix && gps.latitude != frames::kGpsLatitudeInvalid &&
              gps.longitude != frames::kGpsLongitudeInvalid;
 }
 

@@ -99,6 +99,7 @@ void TestInputs::look(const Pilot& pilot,
   facts.button = hal::button_pressed();
   facts.throttle_idle = channels.width_ticks[core::kThrottle] <=
                         static_cast<uint32_t>(config.throttle_idle_max_us) * core::kTicksPerUs;
+  facts.flying = flying_.holds();
   facts.supply = pilot.supply_good;
   InputMemory* const memory = outlet.lend();
   facts.records = memory != nullptr && memory_ != nullptr && config.rate_hz >= kLeastRateHz;
@@ -193,7 +194,8 @@ bool TestInputs::watch_sensors(const Sensors& sensors, Outlet& outlet, uint32_t 
   const uint32_t now_us = hal::now_us();
   see(sensors, watch, now_us);
   if (!command_.running()) return false;
-  const InputEnd why = watch.outside();
+  InputEnd why = watch.outside();
+  if (why == InputEnd::kDone && !flying_.holds()) why = InputEnd::kNotFlying;
   if (why == InputEnd::kDone) return false;
   finish(why, outlet, now_us);
   return true;
@@ -211,7 +213,7 @@ bool TestInputs::news(const Sensors& sensors,
 
 // Each sensor is looked at on its own news, so that what comes seldom costs little; that one ceased
 // is seen with each scan, and each 5 ms where none comes.
-void TestInputs::see(const Sensors& sensors, core::InputWatch& watch, uint32_t now_us) const {
+void TestInputs::see(const Sensors& sensors, core::InputWatch& watch, uint32_t now_us) {
   using core::InputWatch;
   core::InputReadings in;
   const uint8_t imu = sensors.imu().seq;
@@ -247,8 +249,17 @@ void TestInputs::see(const Sensors& sensors, core::InputWatch& watch, uint32_t n
   }
   watch.looked_us = now;
   watch.motion.age(now_us);
+  look_for_flight(sensors, now_us + kAheadUs);
   sensors.ages(&in, now_us + kAheadUs);
   watch.found[InputWatch::kHeard] = core::judge_heard(watch.limits, in, watch.motion, now_us);
+}
+
+void TestInputs::look_for_flight(const Sensors& sensors, uint32_t now_us) {
+  core::InputReadings in;
+  sensors.scan_readings(&in);
+  sensors.gps_readings(&in);
+  sensors.ages(&in, now_us);
+  flying_.look(in, now_us);
 }
 
 void TestInputs::finish(InputEnd why, Outlet& outlet, uint32_t now_us) {
@@ -299,6 +310,7 @@ void TestInputs::step_slow(const PilotLink& pilot,
   const core::RcChannels& rc = pilot.channels();
   if (command_.enabled()) {
     tell_card(outlet, now_us);
+    if (memory_ == nullptr) look_for_flight(sensors, now_us);
   }
   if (flight != core::FlightState::kGround) return;
   travel_.look(rc);
@@ -324,6 +336,9 @@ void TestInputs::enable(const Sensors& sensors, Outlet& outlet, uint32_t now_us)
   home_.latitude = in.latitude;
   home_.longitude = in.longitude;
   home_.cosine = core::home_cosine(in.latitude);
+  uint8_t airspeed_input;
+  read_card(offsetof(CardHead, airspeed_input), &airspeed_input, sizeof airspeed_input);
+  flying_.tare(airspeed_input, card_u16(offsetof(CardHead, dp_min)), in, now_us);
   command_.enable();
   told_ = 0;
   beeps_ = kEnabledBeeps;

@@ -9,6 +9,7 @@
 #include "app/outlet.h"
 #include "app/row_memory.h"
 #include "core/airborne.h"
+#include "core/flying_proof.h"
 #include "core/input_command.h"
 #include "core/rc_decoder.h"
 #include "core/stick_travel.h"
@@ -114,7 +115,8 @@ class TestInputs {
   bool news(const Sensors& sensors, const core::InputWatch& watch, uint32_t turn_us) const;
   __attribute__((noinline)) void see(const Sensors& sensors,
                                      core::InputWatch& watch,
-                                     uint32_t now_us) const;
+                                     uint32_t now_us);
+  void look_for_flight(const Sensors& sensors, uint32_t now_us);
   bool watch_sensors(const Sensors& sensors, Outlet& outlet, uint32_t turn_us);
   void finish(frames::InputEnd why, Outlet& outlet, uint32_t now_us);
   void enable(const Sensors& sensors, Outlet& outlet, uint32_t now_us);
@@ -124,6 +126,7 @@ class TestInputs {
 
   RowMemory* memory_ = nullptr;
   core::InputHome home_;
+  core::FlyingProof flying_;
   core::InputCommand command_;
   core::StickTravel travel_;
   core::HeldSign sign_;

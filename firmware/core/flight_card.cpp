@@ -55,7 +55,7 @@ bool limits_good(const CardHead& head) {
          pair(head.alpha_min, head.alpha_max) && pair(head.beta_min, head.beta_max) &&
          head.phi_max <= kMostBank && head.theta_min <= head.theta_max && head.p_max <= kMostRate &&
          head.q_max <= kMostRate && head.r_max <= kMostRate && head.az_min <= head.az_max &&
-         within(head.height_min_pa, 1, head.height_max_pa) &&
+         within(head.height_min_pa, frames::kCardLeastHeightPa, head.height_max_pa) &&
          head.distance_max_m <= frames::kCardMostDistanceM && within(head.still_ms, 100, 2000) &&
          within(head.stick_us, 10, 200) && servos_good(head) &&
          within(head.rate_max_usps, 100, 60000U) &&

@@ -81,6 +81,7 @@ InputEnd InputCommand::passes(const InputFacts& facts) {
   if (facts.frame_us == 0) return InputEnd::kFrameTime;
   // One and a half frames.
   if (facts.silent_us > facts.frame_us + facts.frame_us / 2U) return InputEnd::kReceiver;
+  if (!facts.flying) return InputEnd::kNotFlying;
   if (!facts.supply) return InputEnd::kSupply;
   if (!facts.records) return InputEnd::kRecorder;
   return facts.throttle_idle ? InputEnd::kThrottleIdle : InputEnd::kDone;

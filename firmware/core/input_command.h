@@ -53,6 +53,7 @@ struct InputFacts {
   bool contact;  // the relay's, closed
   bool button;
   bool throttle_idle;
+  bool flying;   // beyond doubt (flying_proof.h)
   bool supply;   // good
   bool records;  // a session, into a card that takes it
 };

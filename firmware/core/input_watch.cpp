@@ -14,12 +14,6 @@ uint8_t low(uint32_t value) {
   return static_cast<uint8_t>(value ^ value >> 8);
 }
 
-// now_us / 2^14 in whole bytes and a short shift: by 14 it is a loop of 100 cycles.
-uint8_t now_steps(uint32_t now_us) {
-  const uint16_t middle = static_cast<uint16_t>(now_us >> 8U);
-  return static_cast<uint8_t>(static_cast<uint16_t>(middle << 2U) >> 8U);
-}
-
 bool inside(uint16_t value, uint16_t least, uint16_t most) {
   return value >= least && value <= most;
 }
@@ -61,17 +55,23 @@ uint32_t metres(int32_t difference) {
 
 }  // namespace
 
+// time_us / 2^14 in whole bytes and a short shift: by 14 it is a loop of 100 cycles.
+uint8_t steps_16ms(uint32_t time_us) {
+  const uint16_t middle = static_cast<uint16_t>(time_us >> 8U);
+  return static_cast<uint8_t>(static_cast<uint16_t>(middle << 2U) >> 8U);
+}
+
 void InputMotion::start(uint32_t now_us) {
   for (uint8_t i = 0; i < kSensors; ++i) {
     value[i] = 0;
-    moved[i] = static_cast<uint8_t>(now_steps(now_us) - kStale);
+    moved[i] = static_cast<uint8_t>(steps_16ms(now_us) - kStale);
   }
 }
 
 void InputMotion::see(uint8_t sensor, uint8_t seen, uint32_t now_us) {
   if (seen == value[sensor]) return;
   value[sensor] = seen;
-  moved[sensor] = now_steps(now_us);
+  moved[sensor] = steps_16ms(now_us);
 }
 
 void InputMotion::see_imu(const InputReadings& in, uint32_t now_us) {
@@ -100,7 +100,7 @@ void InputMotion::see_gps(const InputReadings& in, uint32_t now_us) {
 }
 
 void InputMotion::age(uint32_t now_us) {
-  const uint8_t now = now_steps(now_us);
+  const uint8_t now = steps_16ms(now_us);
   for (uint8_t& at : moved) {
     if (static_cast<uint8_t>(now - at) > kStale) at = static_cast<uint8_t>(now - kStale);
   }
@@ -112,7 +112,7 @@ uint8_t InputMotion::steps_of(uint16_t still_ms) {
 }
 
 bool InputMotion::moves(uint8_t sensor, uint8_t still_steps, uint32_t now_us) const {
-  return static_cast<uint8_t>(now_steps(now_us) - moved[sensor]) <= still_steps;
+  return static_cast<uint8_t>(steps_16ms(now_us) - moved[sensor]) <= still_steps;
 }
 
 InputEnd judge_imu(const InputLimits& limits, const InputReadings& in) {
@@ -144,8 +144,8 @@ InputEnd judge_baro(const InputLimits& limits, const InputReadings& in, const In
   if (in.static_pressure == 0) return InputEnd::kSensorLost;
   const int32_t drop_pa = static_cast<int32_t>(home.pressure_2pa) * 2 -
                           static_cast<int32_t>(in.static_pressure >> kPaShift);
-  return drop_pa < limits.height_min_pa || drop_pa > limits.height_max_pa ? InputEnd::kHeight
-                                                                          : InputEnd::kDone;
+  const bool high = drop_pa >= limits.height_min_pa && drop_pa >= frames::kCardLeastHeightPa;
+  return high && drop_pa <= limits.height_max_pa ? InputEnd::kDone : InputEnd::kHeight;
 }
 
 InputEnd judge_gps(const InputLimits& limits, const InputReadings& in, const InputHome& home) {
@@ -185,6 +185,8 @@ InputEnd judge_heard(const InputLimits& limits,
 void InputWatch::start(uint32_t now_us) {
   motion.start(now_us);
   for (InputEnd& part : found) part = InputEnd::kSensorLost;
+  // Of a GPS that is not there no news ever comes.
+  if (limits.distance_max_m == 0) found[kGps] = InputEnd::kDone;
   looked_us = static_cast<uint16_t>(now_us);
 }
 

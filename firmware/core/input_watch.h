@@ -27,8 +27,9 @@ struct InputReadings {
   uint32_t static_pressure;  // 1/16 Pa; 0: none
   int32_t latitude;          // 1e-7 deg
   int32_t longitude;
-  bool imu;  // of our own firmware, unsaturated, with an attitude
-  bool gps;  // with a fix
+  uint16_t ground_speed_cmps;  // 0: without a fix
+  bool imu;                    // of our own firmware, unsaturated, with an attitude
+  bool gps;                    // with a fix
 };
 
 // Where the card was enabled.
@@ -76,6 +77,9 @@ static_assert(
         offsetof(InputLimits, rail_min) == offsetof(CardHead, rail_min) - kInputLimitsOffset,
     "a copy of the head's bytes");
 
+// A time in steps of 16.384 ms.
+uint8_t steps_16ms(uint32_t time_us);
+
 // When each sensor's value last moved, in 16 ms; for the time of a trigger and its input.
 struct InputMotion {
   enum : uint8_t { kImu, kAirspeed, kAlpha, kBeta, kBaro, kGps, kSensors };
@@ -112,6 +116,7 @@ constexpr uint16_t kInputGpsMoreMs = 1000;
 // kDone: inside.
 frames::InputEnd judge_imu(const InputLimits& limits, const InputReadings& in);
 frames::InputEnd judge_scan(const InputLimits& limits, const InputReadings& in);
+// However low the card lets it be, frames::kCardLeastHeightPa above home at least.
 frames::InputEnd judge_baro(const InputLimits& limits,
                             const InputReadings& in,
                             const InputHome& home);

@@ -11,7 +11,7 @@
 namespace frames {
 
 constexpr uint8_t kVersion = 1;
-constexpr uint32_t kSchemaHash = 0xA5B43A8Du;
+constexpr uint32_t kSchemaHash = 0x2EF5ACBAu;
 constexpr size_t kMaxWireSize = 68;  // longest frame with its id
 
 // Bits of `valid`.
@@ -200,6 +200,7 @@ enum class InputEnd : uint8_t {
   kThrottleIdle = 23,
   kRowDamaged = 24,
   kTravel = 25,
+  kNotFlying = 26,
 };
 
 enum class Derivative : uint8_t {
@@ -854,7 +855,7 @@ struct __attribute__((packed)) CardHeadLayout {
   uint16_t r_max;  // 0.000266462 rad/s
   int16_t az_min;  // 0.0011971 m/s2; load factor: the most lift is the least az
   int16_t az_max;  // 0.0011971 m/s2
-  uint16_t height_min_pa;  // Pa; least drop of the static pressure since the card was enabled on the ground: 12 Pa a metre; above 0
+  uint16_t height_min_pa;  // Pa; least drop of the static pressure since the card was enabled on the ground: 12 Pa a metre; 120 or more
   uint16_t height_max_pa;  // Pa
   uint16_t distance_max_m;  // m; from where the card was enabled; 0: not watched, and no GPS needed; at most 3000
   uint16_t still_ms;  // ms; a sensor whose value has not moved for so long is stuck; 100 to 2000 (the GPS: 1000 more)
@@ -995,6 +996,7 @@ constexpr uint16_t kCardLongestMs = 20000u;
 constexpr uint16_t kCardMostAmplitudeUs = 500u;
 constexpr uint16_t kCardMostFrequencyChz = 500u;
 constexpr uint16_t kCardMostDistanceM = 3000u;
+constexpr uint16_t kCardLeastHeightPa = 120u;
 constexpr uint16_t kCardRequest = 240u;
 constexpr uint16_t kCardAnswer = 241u;
 

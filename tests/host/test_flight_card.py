@@ -54,6 +54,15 @@ def test_a_card_says_what_was_put_in(card: bytes) -> None:
     assert "multisine: aileron +70 us, elevator +90 us; 10 s" in "\n".join(card_lines(read))
 
 
+def test_a_card_says_what_its_rows_start_by(card: bytes) -> None:
+    """Pitot or GPS; without a pitot on the card GPS alone."""
+    said = "\n".join(card_lines(read_card(card)))
+    assert "12.8 m/s" in said
+    assert "with neither no row starts" in said
+    blind = read_card(card_bytes({**HEAD, "airspeed_input": 255}, [DOUBLET]))
+    assert "without GPS no row starts" in "\n".join(card_lines(blind))
+
+
 def test_no_changed_bit_of_a_card_is_good(card: bytes) -> None:
     rng = random.Random(18)
     for _ in range(300):
@@ -90,7 +99,7 @@ def test_a_row_that_the_logger_refuses_is_named(change: dict[str, object], said:
     [
         ({"stick_us": 5}, "stick_us is 5, expected 10 to 200"),
         ({"dp_min": 4001}, "dp_min 4001 is above"),
-        ({"height_min_pa": 0}, "height_min_pa is 0"),
+        ({"height_min_pa": 119}, "height_min_pa is 119, expected 120 to 2400"),
         ({"servo_max_us": [2000, 2300, 2000]}, "travel of the elevator"),
         ({"frequency_max_chz": 501}, "frequency_max_chz is 501"),
         ({"alpha_input": 7}, "alpha_input is 7"),

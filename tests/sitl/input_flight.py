@@ -33,7 +33,7 @@ AILERON, ELEVATOR, RUDDER, THROTTLE, SWITCH = range(5)
 DIRECT_US, MEGA_US, ARMED_US = 1100, 1675, 1900
 IDLE_US, CRUISE_US = 1100, 1600
 LEAST_US, MOST_US = 1150, 1850  # the travel that the pilot shows
-STILL_UP, PASCAL_UP = 95_372.0, 3.37  # of the datasheet's example; its UP per pascal
+STILL_UP, PASCAL_UP = 95_372.0, 2.67  # at 34.4 kPa by these coefficients; its UP per pascal
 CLIMB_PA = 900.0
 HOME = (247_000_000, 1_210_000_000)
 
@@ -57,6 +57,7 @@ class InputFlight:
     place : (epochs, 2) array
         Latitude and longitude, 1e-7 deg.
     gps_sent : (epochs,) array
+    ground_speed_cmps : (epochs,) array
     button : list of (float, float)
         When it is pressed, and for how long.
     packet_delay_s : float
@@ -73,6 +74,7 @@ class InputFlight:
     up: NDArray[np.float64]
     place: NDArray[np.int64]
     gps_sent: NDArray[np.bool_]
+    ground_speed_cmps: NDArray[np.int64]
     button: list[tuple[float, float]] = field(default_factory=list)
     frame_s: float = FRAME_S
     packet_delay_s: float = 0.0
@@ -103,7 +105,9 @@ class InputFlight:
 
     def gps_bytes(self) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
         """Return ticks and bytes of the GPS."""
-        return _gps(self.place, self.gps_sent).stream()
+        if not self.gps_sent.any():
+            return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.uint8)
+        return _gps(self.place, self.gps_sent, self.ground_speed_cmps).stream()
 
     def give(self, sitl: Sitl) -> None:
         """Hand all stimuli to the instrument."""
@@ -162,6 +166,7 @@ def input_flight(
     return InputFlight(
         seconds, width_us, imu, np.ones(len(imu), dtype=np.bool_), analog, up,
         np.round(place).astype(np.int64), np.ones(len(place), dtype=np.bool_),
+        np.where(at >= UP_S, 1500, 10),
         frame_s=frame_s,
     )  # fmt: skip
 
@@ -178,10 +183,11 @@ def _edges(receiver: Receiver) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
     return at[order][last], levels[last].astype(np.uint8)
 
 
-def _gps(place: NDArray[np.int64], sent: NDArray[np.bool_]) -> Gps:
+def _gps(
+    place: NDArray[np.int64], sent: NDArray[np.bool_], ground_speed_cmps: NDArray[np.int64]
+) -> Gps:
     index = np.flatnonzero(sent)
     count = len(index)
-    moving = index * GPS_S >= UP_S
     values = {
         name: np.full(count, value)
         for name, value in {
@@ -191,5 +197,5 @@ def _gps(place: NDArray[np.int64], sent: NDArray[np.bool_]) -> Gps:
     }  # fmt: skip
     values["itow_ms"] = 100_000_000 + index * 200
     values["latitude"], values["longitude"] = place[index, 0], place[index, 1]
-    values["ground_speed"] = np.where(moving, 1500, 10)
+    values["ground_speed"] = ground_speed_cmps[index]
     return Gps((index * 200_000 + 61_000) * 2, values)

@@ -53,6 +53,7 @@ def test_a_card_is_written_committed_and_read_back(bench: Bench, card: bytes) ->
     [
         ({"aircraft": b"another"}, {}, "aircraft"),
         ({"stick_us": 9}, {}, "limits"),
+        ({"height_min_pa": 119}, {}, "limits"),
         ({}, {"duration_ms": 90}, "row_time"),
         ({}, {"amplitude_us": [0, 121, 0]}, "row_amplitude"),
         ({}, {"duration_ms": 180}, "row_frequency"),

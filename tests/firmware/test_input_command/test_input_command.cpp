@@ -39,7 +39,7 @@ struct Bench {
     facts.frame_us = 20000;
     facts.silent_us = 10000;
     facts.stick_us = 40;
-    facts.contact = facts.supply = facts.records = true;
+    facts.contact = facts.flying = facts.supply = facts.records = true;
     command.enable();
   }
 
@@ -205,6 +205,7 @@ TEST_CASE("what stands against a trigger refuses it, and the switch must come ag
   CHECK(refused([](Bench& b) { b.rc.steady = 0x0F; }));
   CHECK(refused([](Bench& b) { b.facts.frame_us = 0; }));
   CHECK(refused([](Bench& b) { b.facts.silent_us = 30001; }));
+  CHECK(refused([](Bench& b) { b.facts.flying = false; }));
   CHECK(refused([](Bench& b) { b.facts.supply = false; }));
   CHECK(refused([](Bench& b) { b.facts.records = false; }));
   CHECK(refused([](Bench& b) { b.facts.throttle_idle = true; }));
@@ -234,6 +235,7 @@ TEST_CASE("each reason ends it in the look that knows it") {
       {[](Bench& b) { b.facts.drive = frames::Drive::kDirectSelfTest; }, InputEnd::kDrive},
       {[](Bench& b) { b.facts.drive = frames::Drive::kMegaHolding; }, InputEnd::kDrive},
       {[](Bench& b) { b.facts.drive = frames::Drive::kDirectRelay; }, InputEnd::kDrive},
+      {[](Bench& b) { b.facts.flying = false; }, InputEnd::kNotFlying},
       {[](Bench& b) { b.facts.supply = false; }, InputEnd::kSupply},
       {[](Bench& b) { b.facts.records = false; }, InputEnd::kRecorder},
       {[](Bench& b) { b.facts.dropped = 1; }, InputEnd::kDropped},

@@ -77,6 +77,7 @@ struct Bench {
   }
   int judge() const {
     core::InputWatch watch;
+    watch.limits = limits;
     watch.start(now_us);
     watch.found[core::InputWatch::kImu] = core::judge_imu(limits, in);
     watch.found[core::InputWatch::kScan] = core::judge_scan(limits, in);
@@ -217,8 +218,21 @@ TEST_CASE("at the start nothing has moved yet") {
   CHECK_EQ(bench.judge(), static_cast<int>(InputEnd::kSensorStill));
 }
 
+TEST_CASE("however low a card lets it be, 120 Pa above home at least") {
+  SAYS_IN(bench.limits.height_min_pa = 1; bench.in.static_pressure = 16UL * 99881UL, kHeight)
+  SAYS_IN(bench.limits.height_min_pa = 1; bench.in.static_pressure = 16UL * 99880UL, kDone)
+}
+
+TEST_CASE("of a GPS that the card does not want no news is waited for") {
+  core::InputWatch watch;
+  watch.limits.distance_max_m = 0;
+  watch.start(5);
+  CHECK_EQ(static_cast<int>(watch.found[core::InputWatch::kGps]), 0);
+}
+
 TEST_CASE("until every part has been looked at nothing holds") {
   core::InputWatch watch;
+  watch.limits.distance_max_m = 300;
   watch.start(5);
   for (InputEnd& part : watch.found) {
     CHECK_EQ(static_cast<int>(watch.outside()), static_cast<int>(InputEnd::kSensorLost));

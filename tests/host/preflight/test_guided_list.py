@@ -2,11 +2,15 @@
 
 import pytest
 from host.link.status_line import parse_status
+from host.live.live_sample import LIVE_UNITS
 from host.live.live_stream import LiveStream
 from host.live.page_server import _is_preflight
-from host.preflight.check_list import CheckListInputs
+from host.preflight.check_list import CheckListInputs, check_list
 from host.preflight.guided_list import Preflight
+from host.preflight.outside_checks import NO_PROOF
+from host.preflight.pilot_settings import PilotSettings
 from host.preflight.preflight_screen import list_lines
+from host.preflight.sample import Sample
 from host.preflight.usb_status import status_readings
 from host.twin.ground.ground_faults import GROUND_FAULTS, broken_walk
 from host.twin.ground.ground_instrument import ground_frames
@@ -51,6 +55,18 @@ def test_what_nobody_does_is_red_with_what_was_seen() -> None:
     assert not preflight.go
     assert {check.state for check in preflight.checks} == {"failed"}
     assert all(check.reason for check in preflight.checks)
+
+
+@pytest.mark.parametrize(("gps", "without"), [(False, "pitots"), (False, ""), (True, "pitots")])
+def test_with_neither_gps_nor_pitot_it_says_that_no_row_starts(gps: bool, without: str) -> None:
+    settings = PilotSettings()
+    settings.gps = gps
+    out = {without: "none fitted"} if without else {}
+    checks = check_list(CheckListInputs(aircraft(), lines(), settings, without=out))
+    check = next(one for one in checks if one.key == "gps")
+    check.take(Sample(0.0, (0.0,) * len(LIVE_UNITS), mega_drives=False))
+    assert (check.title == NO_PROOF) == (not gps and bool(without))
+    assert (check.state == "seen") == (not gps)
 
 
 def test_by_wire_nothing_is_said_of_the_radio() -> None:

@@ -69,7 +69,8 @@ def check_list(wanted: CheckListInputs) -> list[Check]:
     settings = wanted.settings
     checks: list[Check] = [
         LoggerCheck(wanted.aircraft.name), ReceiverCheck(), ImuCheck(), GyroZeroCheck(),
-        RestPressureCheck(sides), BaroCheck(), GpsCheck(settings), CardCheck(), TurnCheck(),
+        RestPressureCheck(sides), BaroCheck(), GpsCheck(settings, pitots=bool(sides)), CardCheck(),
+        TurnCheck(),
         *(VaneCheck(name, tuple(one for one in vanes if one != name)) for name in vanes),
         *(PitotCheck(side, "".join(one for one in sides if one != side)) for side in sides),
         *(surface_check(wanted, surface) for surface in SURFACES),

@@ -10,6 +10,8 @@ from host.preflight.check import Check
 from host.preflight.pilot_settings import PilotSettings
 from host.preflight.sample import Sample, SlowReading
 
+NO_PROOF = "no GPS and no pitot: no row of a flight card starts"
+
 
 class GpsCheck(Check):
     """GPS gives a fresh three-dimensional fix, at rest.
@@ -17,11 +19,13 @@ class GpsCheck(Check):
     Parameters
     ----------
     settings : PilotSettings
+    pitots : bool
+        A pitot is on the list: it too tells the logger that the aircraft flies.
     """
 
-    def __init__(self, settings: PilotSettings) -> None:
+    def __init__(self, settings: PilotSettings, *, pitots: bool = True) -> None:
         super().__init__("gps", "GPS fix", "nothing: open sky, up to a minute after power-on")
-        self._settings = settings
+        self._settings, self._pitots = settings, pitots
         self._since_s: float | None = None
         self._heard_s: float | None = None
         self._first_s: float | None = None
@@ -33,6 +37,8 @@ class GpsCheck(Check):
     def take(self, sample: Sample) -> None:
         """Look at its age."""
         if not self._settings.gps:
+            if not self._pitots:
+                self.title = NO_PROOF
             self.pass_check()  # the settings expect none
             return
         if self._first_s is None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from host.wire.flight_card import AXES, HEAD, CardFile, components, scale
+from host.wire.flight_card import AXES, HEAD, NONE, CardFile, components, scale
 from host.wire.schema_text import packed_schema
 
 NAMES = {"three_two_one_one": "3-2-1-1"}
@@ -44,10 +44,22 @@ def card_lines(card: CardFile) -> list[str]:
         " from home",
         f"    travel {_travel(head)} us, at most {head['rate_max_usps']} us/s and"
         f" {head['frequency_max_chz'] / 100.0:g} Hz",
+        f"  starts where for 3 s {_proof(head)}",
     ]
     for k, (row, turn) in enumerate(zip(card.rows, card.teaches, strict=True), start=1):
         lines.append(f"  {k:2d}  {_row(row)}{f'; teaches {turn}' if turn else ''}")
     return lines
+
+
+def _proof(head: Mapping[str, Any]) -> str:
+    """Return what the logger takes for flying (firmware/core/flying_proof.h)."""
+    gps = "GPS above 5 m/s over ground"
+    if head["airspeed_input"] == NONE:
+        return f"{gps}: the card names no pitot, and without GPS no row starts"
+    return (
+        "the pitot reads the least airspeed, and 100 Pa (12.8 m/s) above its zero, or"
+        f" {gps}; with neither no row starts"
+    )
 
 
 def _travel(head: Mapping[str, Any]) -> str:

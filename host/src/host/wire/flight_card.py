@@ -225,8 +225,8 @@ def _limit_faults(head: Mapping[str, Any]) -> Iterator[str]:
         if head[f"{name}_min"] > head[f"{name}_max"]:
             yield f"{name}_min {head[f'{name}_min']} is above {name}_max {head[f'{name}_max']}"
     ranges = {
-        "height_min_pa": (1, head["height_max_pa"]), "phi_max": (0, 18_000), "p_max": (0, 32_767),
-        "q_max": (0, 32_767), "r_max": (0, 32_767),
+        "height_min_pa": (number("card_least_height_pa"), head["height_max_pa"]),
+        "phi_max": (0, 18_000), "p_max": (0, 32_767), "q_max": (0, 32_767), "r_max": (0, 32_767),
         "distance_max_m": (0, number("card_most_distance_m")),
         "still_ms": (100, 2000), "stick_us": (10, 200), "rate_max_usps": (100, 60_000),
         "frequency_max_chz": (1, number("card_most_frequency_chz")),
