@@ -69,10 +69,12 @@ def test_a_doubted_file_is_named_with_the_errors_it_claims_too_small() -> None:
     assert "vane_scale" not in line
 
 
-@pytest.mark.parametrize("seed", [24320, 24326, 24338])
-def test_without_gps_what_looks_like_a_tilt_of_the_imu_doubts_no_file(seed: int) -> None:
-    """Zero of the vane, 12 mrad by the fit, and a gyro's bias: 3 to 6 times what the file said."""
-    answer = answer_with_file(Air(), seed, "longitudinal")
+def test_without_gps_what_looks_like_a_tilt_of_the_imu_doubts_no_file() -> None:
+    """Zero of the vane, 12 mrad by the fit, and a gyro's bias: 3 to 6 times what the file said.
+
+    The seed is one of three in twenty whose file was doubted: another flight would show nothing.
+    """
+    answer = answer_with_file(Air(), 24320, "longitudinal")
     assert "calibration" not in {finding.check for finding in answer.findings}
 
 

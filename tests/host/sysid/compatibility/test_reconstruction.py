@@ -90,7 +90,7 @@ def test_strapdown_flies_a_level_turn() -> None:
 
 def test_slopes_are_those_of_finite_differences() -> None:
     rng = np.random.default_rng(3)
-    n, block = 400, 2
+    n, block = 200, 2
     t = np.arange(n)[:, None] * 0.01
     wave = np.sin(2.0 * np.pi * rng.uniform(0.3, 1.0, 6) * t + rng.uniform(0.0, 6.0, 6))
     outputs = (*AIR, HEIGHT, *GPS)
@@ -135,7 +135,7 @@ def test_slopes_are_those_of_finite_differences() -> None:
 
 def test_errors_of_recorded_flights_are_inside_their_intervals() -> None:
     inside, informed = [], set()
-    for seed in (1, 2, 3):
+    for seed in (1, 2):
         _, true = flown(seed)
         found = recorded.reconstructed("survey", seed)
         assert found.gps
@@ -330,7 +330,7 @@ def test_without_gps_an_error_of_the_imu_does_not_pass_for_the_vanes_zero() -> N
 
 
 def test_poor_data_end_in_one_line() -> None:
-    columns, _ = flown(1)
+    columns = {k: v[:6000] for k, v in flown(1)[0].items()}
     with pytest.raises(IdentificationError, match="needs ax_mps2"):
         reconstruct({k: v for k, v in columns.items() if k != "ax_mps2"})
     with pytest.raises(IdentificationError, match="no 12 s of flight"):

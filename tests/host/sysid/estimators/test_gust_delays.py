@@ -46,7 +46,7 @@ def _flown(seed: int, vane_s: float, imu_s: float) -> Maneuver:
     return Maneuver(dt_s=DT_S, inputs=coarse[:, None], outputs=outputs)
 
 
-@pytest.mark.parametrize(("vane_s", "imu_s"), [(0.0, 0.0), (0.004, 0.001), (0.013, 0.0)])
+@pytest.mark.parametrize(("vane_s", "imu_s"), [(0.0, 0.0), (0.013, 0.001)])
 def test_a_delay_is_found_in_gusts_and_none_is_made_up(vane_s: float, imu_s: float) -> None:
     """With lags in place of a delay the vane seemed 3 ms late, known to 5, M_alpha 3 % off."""
     model = template("short-period", Trim(SPEED_MPS))
@@ -74,10 +74,9 @@ def _with_slow_vane(whole: Maneuver) -> Maneuver:
     return replace(whole, outputs=outputs, sampled=sampled)
 
 
-@pytest.mark.parametrize("vane_s", [0.0, 0.013])
-def test_the_delay_of_a_slow_vane_is_found(vane_s: float) -> None:
+def test_the_delay_of_a_slow_vane_is_found() -> None:
     """Its samples move with it: with those of the rows in between M_alpha was 8 % off."""
-    model = template("short-period", Trim(SPEED_MPS))
+    vane_s, model = 0.013, template("short-period", Trim(SPEED_MPS))
     model = template("short-period", Trim(SPEED_MPS), delays=delays_of(model.outputs))
     assert model.outputs[0] == "alpha_rad"
     whole = [_flown(seed, vane_s, 0.0) for seed in (1, 2)]

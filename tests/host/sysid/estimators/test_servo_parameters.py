@@ -87,17 +87,16 @@ WIDE = ServoPrior((0.0, 8.0, 5.2), (0.05, 2.3, 1.3))
 
 
 def test_the_delay_moves_with_the_commands_and_pitch_damping_stays() -> None:
-    """0, 20, 40, 60 ms earlier commands are 0, 20, 40, 60 ms more delay."""
-    found = [_found(shift, WIDE) for shift in (0.0, 0.02, 0.04, 0.06)]
+    """60 ms earlier commands are 60 ms more delay."""
+    found = [_found(shift, WIDE) for shift in (0.0, 0.06)]
     first, fitted = found[0]
     half = fitted.half_width()
     assert abs(first.setting[0] - LATE[0]) < first.numbers[0].half_width
     assert first.numbers[0].data_informed
     assert not first.numbers[1].data_informed
-    for (servo, other), shift in zip(found, (0.0, 0.02, 0.04, 0.06), strict=True):
-        assert servo.setting[0] - first.setting[0] == pytest.approx(shift, abs=0.004)
-        k = fitted.index("M_q")
-        assert abs(other.value("M_q") - fitted.value("M_q")) < 0.5 * half[k]
+    servo, other = found[1]
+    assert servo.setting[0] - first.setting[0] == pytest.approx(0.06, abs=0.004)
+    assert abs(other.value("M_q") - fitted.value("M_q")) < 0.5 * half[fitted.index("M_q")]
     for name in ("M_alpha", "M_q", "M_de"):
         k = fitted.index(name)
         assert abs(fitted.value(name) - TRUE[name]) < 1.5 * half[k]
@@ -170,7 +169,7 @@ def test_the_commands_of_a_real_flight_have_their_lag() -> None:
     answers = [
         host.identify(
             flight, mapping=THOR / "map.toml", aircraft="ultrastick25e", models="short-period",
-            from_s=240.0, to_s=270.0,
+            from_s=240.0, to_s=255.0, methods="output-error-white",
         ).linear[0]
         for flight in (table, earlier)
     ]  # fmt: skip

@@ -370,6 +370,7 @@ def test_the_verb_says_what_it_corrected_and_can_leave_it(
     source = tmp_path / "flight.csv"
     pd.DataFrame(columns).to_csv(source, index=False)
     options = ["identify", str(source), "--model", "short-period", "--aircraft", NAME]
+    options += ["--method", "equation-error"]
     assert main([*options, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)["answers"][0]
     assert answer["corrections"]["gyro_bias_x_radps"]["half_width"] > 0.0

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -69,6 +70,7 @@ def test_speed_against_force_is_a_finding_and_no_refusal(
 ) -> None:
     CLEAN[case](record).to_csv(tmp_path / "x.csv", index=False)
     options = ["identify", str(tmp_path / "x.csv"), "--model", "short-period", "--json"]
+    options += ["--method", "equation-error"]
     assert main(options) == 0
     answer = json.loads(capsys.readouterr().out)
     [found] = [f for f in answer["findings"] if f["check"] == "airspeed-against-ax"]
@@ -116,7 +118,7 @@ def test_lift_as_deviation_from_trim_is_fitted(record: pd.DataFrame, tmp_path: P
     """Only the aerodynamic force, about its trim: 1.14 m/s2 in the median was "in g?"."""
     az = record["az_mps2"] - record["az_mps2"].mean()
     bare = record.drop(columns=["ax_mps2", "ay_mps2"]).assign(az_mps2=1.14 / az.abs().median() * az)
-    found = host.identify(bare, models="short-period")
+    found = host.identify(bare, models="short-period", methods="equation-error")
     assert [f.check for f in found.findings if "az_mps2" in f.channels]
     assert not any("in g" in f.done for f in found.findings)
 
@@ -144,7 +146,8 @@ def test_small_inputs_are_fitted_as_one_stretch(record: pd.DataFrame) -> None:
     moving = [k for k in record if k != "t_s" and str(k).endswith(("_rad", "_radps", "_mps2"))]
     mean = record[moving].mean()
     small = record.assign(**(mean + 0.15 * (record[moving] - mean)))
-    found = host.identify(small, models="short-period")
+    how: dict[str, Any] = {"models": "short-period", "methods": "output-error-white"}
+    found = host.identify(small, **how)
     [finding] = [f for f in found.findings if f.check == "small-inputs"]
     assert "is fitted as one stretch" in finding.done
     assert finding.channels == ()
@@ -154,8 +157,8 @@ def test_small_inputs_are_fitted_as_one_stretch(record: pd.DataFrame) -> None:
     [accepted] = [f for f in again.findings if f.check == "small-inputs"]
     assert accepted.accepted
     assert accepted.done == f"accepted, which overrides nothing: {finding.done}"
-    given = host.identify(small, models="short-period", from_s=float(record["t_s"][0]))
-    large = host.identify(record, models="short-period", from_s=float(record["t_s"][0]))
+    given = host.identify(small, **how, from_s=float(record["t_s"][0]))
+    large = host.identify(record, **how, from_s=float(record["t_s"][0]))
     for name in ("M_alpha", "M_q", "M_de"):
         value, same, other = (x.linear[0].result.value(name) for x in (found, given, large))
         assert value == pytest.approx(same, rel=0.01), name
@@ -166,16 +169,14 @@ def test_small_inputs_are_fitted_as_one_stretch(record: pd.DataFrame) -> None:
 THOR = ROOT / "tests/data/thor75"
 
 
-@pytest.mark.parametrize(
-    ("aircraft", "stretch"),
-    [([], []), (["--aircraft", "ultrastick25e"], ["--from", "245", "--to", "265"])],
-)
+@pytest.mark.parametrize("how", [["--model", "short-period"], ["--aircraft", "ultrastick25e"]])
 def test_a_real_aircraft_goes_through_as_it_is(
-    aircraft: list[str], stretch: list[str], capsys: pytest.CaptureFixture[str]
+    how: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Indicated airspeed, commands for positions, feedback: findings and doubts, no trust."""
     source, mapping = THOR / "flight75_240_270.csv", THOR / "map.toml"
-    options = ["identify", str(source), *stretch, "--map", str(mapping), *aircraft, "--json"]
+    options = ["identify", str(source), "--from", "245", "--to", "265"]
+    options += ["--map", str(mapping), *how, "--json"]
     assert main(options) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["answers"]

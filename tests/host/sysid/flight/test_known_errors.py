@@ -18,23 +18,19 @@ from studies.foreign.instrument import SENSORS_FILE
 from studies.independent import NAMES, answer_with_file
 from studies.wrong_flights import TRUTH, fly
 
-SEEDS = range(24310, 24313)
+SEED = 24310
 
 
 # The aircraft is not linear: in pitch that may be said.
-@pytest.mark.parametrize(("axis", "most"), [("longitudinal", 3), ("lateral", 1)])
-def test_right_flights_in_calm_air_stay_under_trust(axis: str, most: int) -> None:
+@pytest.mark.parametrize(("axis", "may_be_said"), [("longitudinal", True), ("lateral", False)])
+def test_a_right_flight_in_calm_air_stays_under_trust(axis: str, may_be_said: bool) -> None:
     """Of six lateral flights three had lost N_beta, five were accused."""
-    accused, lost = 0, []
-    for seed in SEEDS:
-        identified = answer_with_file(Air(), seed, axis)
-        [answer] = [a for a in identified.answers if isinstance(a, Answer) and a.template == axis]
-        assert answer.coherence is not None
-        accused += bool(answer.coherence.coherent)
-        marks = verdict_of(answer, identified.evidence).marks
-        lost += [name for name in NAMES[axis] if marks[name] != TRUSTED]
-    assert accused <= most
-    assert lost == []
+    identified = answer_with_file(Air(), SEED, axis)
+    [answer] = [a for a in identified.answers if isinstance(a, Answer) and a.template == axis]
+    assert answer.coherence is not None
+    assert may_be_said or not answer.coherence.coherent
+    marks = verdict_of(answer, identified.evidence).marks
+    assert [name for name in NAMES[axis] if marks[name] != TRUSTED] == []
 
 
 def test_a_deviation_of_a_scale_is_a_share_of_what_was_simulated() -> None:

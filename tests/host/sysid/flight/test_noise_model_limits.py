@@ -31,9 +31,8 @@ def gust_filter(fault: str, seed: int, noise: str = "gust") -> Answer:
     return answer
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_right_model_in_gusts_is_within_its_own_noise(seed: int) -> None:
-    answer = gust_filter("none", seed)
+def test_a_right_model_in_gusts_is_within_its_own_noise() -> None:
+    answer = gust_filter("none", 1)
     assert not any(WORDS in w for w in answer.result.warnings)
     assert all(one.holds for one in answer.predictions.values())
 

@@ -1,10 +1,8 @@
 """A pilot who takes over is told from a test input, and accuses no right model."""
 
-import pytest
 from host.arrays import Array
 from host.instrument.instrument_errors import usual_errors
 from host.physical.recording import FOREIGN
-from host.sysid.flight import linear_intervals
 from host.sysid.flight.maneuver_detection import detect_maneuvers
 from host.sysid.flight.pilot_takeover import taken_over
 from studies import independent
@@ -29,15 +27,10 @@ def test_a_pilot_who_takes_over_is_told_from_a_test_input() -> None:
     assert sum(found[False]) >= 0.7 * len(found[False]) >= 4
 
 
-@pytest.mark.parametrize(("known", "least", "most"), [(True, 0.0, 0.2), (False, 0.3, 1.0)])
-def test_what_only_his_taking_over_shows_widens_nothing(
-    monkeypatch: pytest.MonkeyPatch, known: bool, least: float, most: float
-) -> None:
+def test_what_only_his_taking_over_shows_widens_nothing() -> None:
     """A lag of the aileron was suspected, and L_p known to 36 % where 17 are due."""
-    if not known:
-        monkeypatch.setattr(linear_intervals, "taken_over", lambda *_: False)
     airspeed = usual_errors(FOREIGN).scaled(0.0, "pitot_scale", "pitot_zero_pa", "density_share")
     columns: dict[str, Array] = dict(independent.flown(ROLLING, 18609))
     [answer] = identify(columns, names=("lateral",), maker=FOREIGN, errors=airspeed)
     half = answer.result.half_width()[answer.result.index("L_p")]
-    assert least < half / abs(answer.result.value("L_p")) < most
+    assert half / abs(answer.result.value("L_p")) < 0.2

@@ -75,7 +75,7 @@ def test_a_short_period_is_known_while_airspeed_and_attitude_vary() -> None:
     limits = {"Z_alpha": 0.1, "M_alpha": 0.06, "M_q": 0.06, "M_de": 0.02}
     shares = []
     # What the scale of the airspeed does to Z_alpha is 6 to 13 % from flight to flight.
-    for seed in (4, 5, 7):
+    for seed in (4, 5):
         columns, _ = fly_foreign(cells()["calm"], seed)
         answer = host.identify(pd.DataFrame(columns), models="short-period").linear[0]
         true, half = foreign_derivatives(answer.trim.airspeed_mps), answer.result.half_width()
@@ -124,7 +124,7 @@ def test_noise_of_the_airspeed_counts_as_far_as_it_scatters_the_estimate(
     columns, maneuvers = calm
     flight = reconstruct_flight(columns, windows(maneuvers), airframe=bare())
     rng, found, counted = np.random.default_rng(8), [], []
-    for _ in range(8):
+    for _ in range(6):
         noise = 0.5 * rng.standard_normal(len(columns["t_s"]))
         noisy = dict(flight.corrected) | {"airspeed_mps": columns["airspeed_mps"] + noise}
         estimator = linear_estimator.LinearEstimator("lateral", airframe=bare())
