@@ -124,7 +124,9 @@ def test_a_table_at_hand_gives_the_same_numbers(
     ours, theirs = loose(found.table).loc["longitudinal"], loose(one.table).loc["longitudinal"]
     np.testing.assert_allclose(ours["value"], theirs["value"], rtol=1e-9)
     np.testing.assert_allclose(ours["half_width"], theirs["half_width"], rtol=1e-9)
-    with_index = host.identify(table.set_index("t_s"), models="short-period")
+    with_index = host.identify(
+        table.set_index("t_s"), models="short-period", methods="equation-error"
+    )
     assert "M_alpha" in loose(with_index.table).loc["short-period"].index
 
 
@@ -207,7 +209,10 @@ def test_the_verb_takes_several_flights(
     both: Identification, flights: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
     sources = [str(folder / "flight.csv") for folder in flights]
-    assert main(["identify", *sources, "--model", "lateral", "--json"]) == 0
+    assert (
+        main(["identify", *sources, "--model", "lateral", "--method", "equation-error", "--json"])
+        == 0
+    )
     answer = json.loads(capsys.readouterr().out)
     assert answer["source"] == sources
     assert {m[-len("of flight 2") :] for m in answer["answers"][0]["maneuvers"]} == {
@@ -312,7 +317,7 @@ def test_pictures_are_shown_and_saved(one: Identification, tmp_path: Path) -> No
 def test_a_hostile_name_is_text_on_the_page(flights: tuple[Path, Path], tmp_path: Path) -> None:
     hostile = tmp_path / '<img src=x onerror="alert(1)">&\x1b[2J\u202e.csv'
     hostile.write_bytes((flights[0] / "flight.csv").read_bytes())
-    found = host.identify(hostile, models="short-period")
+    found = host.identify(hostile, models="short-period", methods="equation-error")
     simulated = found.simulate(hostile)
     noted = replace(found, notes=("<script>alert(2)</script>",))
     for page in (noted._repr_html_(), simulated._repr_html_()):

@@ -73,7 +73,7 @@ def test_a_parameter_that_is_named_after_gusts_is_in_the_answer(tmp_path: Path) 
     model = tmp_path / "mine.toml"
     model.write_text(TEXT.replace("Zaa", "gust_aa"), encoding="utf-8")
     [record, _] = flown(model)
-    answer = host.identify(record, models=model, methods="output-error-white", from_s=0.0, to_s=5.0)
+    answer = host.identify(record, models=model, methods="output-error-white", from_s=0.0, to_s=2.5)
     assert "gust_aa" in answer.linear[0].result.names
 
 
