@@ -2,22 +2,50 @@
 
     make ideas                 figures of the package, and what an identification enters
     make ideas IDEAS=--still   what the syntax trees say alone, in seconds
+    make ideas IDEAS=--check   the table of numbers alone: 6 if one has no class
+    make ideas IDEAS=--follow  the table rewritten for the code as it is
+    make ideas LITERALS=30     numbers drawn and changed by 20 %: 6 if a frozen answer moves
 
-Exits with 6 where the declaration names what is not there.
+Exits with 6 where the declaration names what is not there, too.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
+from tests.ideas.classes import (
+    CLASSES,
+    OPEN,
+    Row,
+    counted,
+    follow,
+    missing,
+    read,
+    row_of,
+    stale,
+    write,
+)
 from tests.ideas.declared import Kind, kinds
+from tests.ideas.drawn import ALL_CASES, CASES, drawn, movers
 from tests.ideas.entered import Entered, entered, simulated, total_calls
-from tests.ideas.sources import ROOT, Function, Module, circles, functions, modules
+from tests.ideas.literals import Key, code_literals, toml_files, toml_literals
+from tests.ideas.sources import (
+    ROOT,
+    Function,
+    Module,
+    circles,
+    entry_points,
+    functions,
+    modules,
+    reachable,
+)
 
 FLIGHT = ROOT / "build" / "ideas"
 SYSID = "host.sysid"
+DOOR = "host.sysid.pipeline.stages"
 MOST_LINES, MOST_COMPLEXITY = 60, 15
 MOST_FILE_LINES = 400
 
@@ -29,8 +57,25 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("--still", action="store_true", help="run nothing: syntax trees alone")
     parser.add_argument("--names", action="store_true", help="name every long or branched function")
+    parser.add_argument("--check", action="store_true", help="only: has every number a class?")
+    parser.add_argument("--follow", action="store_true", help="rewrite the table of numbers")
+    parser.add_argument("--change", type=int, metavar="N", help="draw N numbers and change them")
+    parser.add_argument("--all", action="store_true", help="by every frozen answer, not three")
+    parser.add_argument("--seed", type=int, default=1, help="of the draw (default 1)")
     asked = parser.parse_args(arguments)
     known = modules()
+    rows = read()
+    reached = sorted(reachable([DOOR, *entry_points()], known))
+    code = sorted(code_literals(known[name] for name in reached))
+    keys = sorted({*code, *toml_literals(toml_files(known, reached))})
+    if asked.follow:
+        write(follow(keys, rows))
+        rows = read()
+    if asked.check or asked.follow:
+        return _print_numbers(keys, rows)
+    if asked.change:
+        cases = ALL_CASES if asked.all else CASES
+        return _change(drawn(code, rows, asked.change, asked.seed), cases)
     inside = [one for one in known.values() if one.name.startswith(SYSID)]
     parts = [part for one in inside for part in functions(one)]
     declared = kinds({part.label for part in parts})
@@ -39,11 +84,38 @@ def main(arguments: list[str] | None = None) -> int:
     _print_kinds(declared)
     _print_sizes(list(known.values()), inside)
     _print_functions(parts, names=asked.names)
+    _print_numbers(keys, rows)
     found = circles(known)
     _row("circles of imports", len(found), "; ".join(", ".join(circle) for circle in found))
     faults = [fault for kind in declared.values() for fault in kind.faults]
     print("\n".join(faults), file=sys.stderr, end="\n" if faults else "")
     return 6 if faults else 0
+
+
+def _print_numbers(keys: list[Key], rows: dict[Key, Row]) -> int:
+    """Print how many numbers each class has; return 6 and name them where some have none."""
+    of_class = counted(keys, rows)
+    listed = ", ".join(f"{kind} {of_class[kind]}" for kind in (*CLASSES, OPEN) if of_class[kind])
+    _row("numbers that host.identify can reach", len(keys), listed)
+    tuned = [row for row in (row_of(key, rows) for key in keys) if row and row.kind == "tuned"]
+    _row("tuned numbers with a source", sum(bool(row.source) for row in tuned), f"of {len(tuned)}")
+    bare, gone = missing(keys, rows), stale(keys, rows)
+    for key in bare:
+        print(f"no class: {key.file} {key.name} {key.value}", file=sys.stderr)
+    if bare or gone:
+        said = f"{len(bare)} numbers have no class, {len(gone)} rows no number"
+        print(f"{said}; make ideas IDEAS=--follow, then say what '?' is", file=sys.stderr)
+    return 6 if bare else 0
+
+
+def _change(keys: list[Key], cases: Sequence[str]) -> int:
+    """Change numbers, and name those that move a frozen answer."""
+    found = list(movers(keys, cases))
+    _row("numbers changed by 20 %", len(keys), f"{len(found)} move a frozen answer")
+    for one in found:
+        print(f"{one.key.file} {one.key.name} {one.key.value}")
+        print("".join(f"    {line}\n" for line in one.lines), end="")
+    return 6 if found else 0
 
 
 def _row(what: str, value: object, more: str = "") -> None:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator, Mapping
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ROOT / "host" / "src"
+PROJECT = ROOT / "host" / "pyproject.toml"
 
 MODULE_NAME = re.compile(r"\bhost(?:\.\w+)+")
 FunctionNode = ast.FunctionDef | ast.AsyncFunctionDef
@@ -188,13 +190,13 @@ def _base(node: ast.ImportFrom, module: Module) -> str:
     return ".".join((*parts[: len(parts) - above], *filter(None, [node.module])))
 
 
-def reachable(start: str, known: Mapping[str, Module]) -> set[str]:
-    """Return the modules that importing one can lead to, and itself.
+def reachable(starts: Iterable[str], known: Mapping[str, Module]) -> set[str]:
+    """Return the modules that importing some can lead to, and themselves.
 
-    A method by name lives in `host.sysid.estimators`; its registry names the file alone.
+    A method is registered by the name of its file alone.
     """
     found: set[str] = set()
-    ahead = [start]
+    ahead = list(starts)
     while ahead:
         name = ahead.pop()
         if name not in found:
@@ -219,6 +221,12 @@ def plugged_in(module: Module, known: Mapping[str, Module]) -> set[str]:
         and isinstance(node.args[0], ast.Constant)
     }
     return {name for name, one in known.items() if one.stem in stems}
+
+
+def entry_points(project: Path = PROJECT) -> list[str]:
+    """Return the modules that the package plugs into its own doors."""
+    groups = tomllib.loads(project.read_text(encoding="utf-8"))["project"].get("entry-points", {})
+    return [text.partition(":")[0] for group in groups.values() for text in group.values()]
 
 
 def circles(known: Mapping[str, Module]) -> list[list[str]]:

@@ -13,6 +13,7 @@ from tests.ideas.sources import (
     body_lines,
     circles,
     complexity,
+    entry_points,
     functions,
     imports,
     modules,
@@ -74,12 +75,19 @@ def f():
     known = written(tmp_path, a=text, b="", c="", d="")
     assert imports(known["host.a"], known) == {"host.b", "host.c"}
     assert imports(known["host.a"], known, by_name=False) == {"host.b"}
-    assert reachable("host.a", known) == {"host.a", "host.b", "host.c"}
+    assert reachable(["host.a"], known) == {"host.a", "host.b", "host.c"}
 
 
 def test_methods_of_a_registry_are_reached(tmp_path: Path) -> None:
     known = written(tmp_path, a='M = {"one": Method("b", "fit")}', b="", c="")
-    assert reachable("host.a", known) == {"host.a", "host.b"}
+    assert reachable(["host.a"], known) == {"host.a", "host.b"}
+
+
+def test_entry_points_are_modules(tmp_path: Path) -> None:
+    project = tmp_path / "pyproject.toml"
+    project.write_text('[project.entry-points.methods]\none = "host.b:ONE"\ntwo = "host.c:TWO"\n')
+    assert entry_points(project) == ["host.b", "host.c"]
+    assert set(entry_points()) <= set(modules())
 
 
 def test_circle_of_three_is_found_and_a_chain_is_not(tmp_path: Path) -> None:
