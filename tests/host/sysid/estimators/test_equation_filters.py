@@ -137,7 +137,9 @@ def test_the_air_moves_already_when_a_record_begins(decay: str, variance: float)
         np.array([[-4.0, 1.0], [0.0, -float(decay)]]), np.array([0.0, 0.25]), 0.01
     )
     expected = (F @ np.diag([0.0, variance]) @ F.T + Q)[0, 0] + 0.1**2
-    assert found.power[0][1, 0] == pytest.approx(expected, rel=1e-6)
+    [run] = found.runs
+    variance = (run.independent / run.white)[1, 0] ** 2
+    assert variance == pytest.approx(expected, rel=1e-6)
 
 
 def test_filter_error_of_linear_equations_is_that_of_the_linear_model() -> None:
@@ -251,7 +253,10 @@ def test_filter_error_takes_delays_of_outputs_and_inputs() -> None:
         assert min(cost, key=lambda at: cost[at]) == 0.1, signal
 
 
-def test_without_a_compiler_a_long_record_is_refused_in_a_line() -> None:
+def test_without_a_compiler_a_long_record_is_refused_in_a_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("host.sysid.numerics.equation_filter_problem.has_compiler", lambda: False)
     still: Array = np.tile(rolled().outputs, (11, 1))
     long = Maneuver(DT_S, np.tile(rolled().inputs, (11, 1)), still)
     with pytest.raises(IdentificationError, match="takes hours without numba"):

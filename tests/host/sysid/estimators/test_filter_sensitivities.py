@@ -5,12 +5,8 @@ import pytest
 from host.sysid.estimators.filter_error import fit_filter_error
 from host.sysid.estimators.gust_model import gust_model
 from host.sysid.models import LinearModel, Maneuver, Trim, template
-from host.sysid.numerics.filter_problem import FilterProblem, InnovationLikelihood
-from host.sysid.numerics.filter_scoring import (
-    fisher_scoring,
-    total_information,
-    whitened_innovation_sensitivities,
-)
+from host.sysid.numerics.filter_problem import FilterProblem
+from host.sysid.numerics.innovation_problem import InnovationLikelihood
 from host.sysid.numerics.output_error_problem import OutputProblem
 
 KNOWN = {"Z_alpha": -8.0, "M_alpha": -60.0, "M_q": -8.0, "M_de": -70.0, "Z_de": -0.5}
@@ -68,9 +64,7 @@ def test_gradient_is_that_of_differences_where_a_gust_dies_away_within_a_sample(
     problem = FilterProblem(model, flown(model, (1,)), ("gust_rad", "airspeed_mps"))
     theta = vector(problem)
     here = known(problem.evaluate(theta))
-    information, gradient = total_information(
-        problem.output_problem, theta, *fisher_scoring(problem, theta, here)
-    )
+    information, gradient = problem.total(theta, *problem.scoring(theta, here))
     for name in ("Z_alpha", "M_q", "log_process.gust_rad"):
         k, width = problem.names.index(name), np.zeros(len(theta))
         width[k] = 1e-3 / np.sqrt(information[k, k])
@@ -84,9 +78,7 @@ def test_gradient_and_information_are_those_of_differences() -> None:
     problem = FilterProblem(model, flown(model, (1, 2)), ("gust_rad", "airspeed_mps"))
     theta = vector(problem)
     here = known(problem.evaluate(theta))
-    information, gradient = total_information(
-        problem.output_problem, theta, *fisher_scoring(problem, theta, here)
-    )
+    information, gradient = problem.total(theta, *problem.scoring(theta, here))
     size = np.sqrt(np.diag(information))
     white, spread, slope = [], [], []
     for k in range(len(theta)):
@@ -99,9 +91,7 @@ def test_gradient_and_information_are_those_of_differences() -> None:
         white.append(np.concatenate(moved).ravel())
         spread.append((W @ (up.filters[0].S - down.filters[0].S) @ W.T / (2.0 * width[k])).ravel())
     J, L = np.array(white), np.array(spread)
-    exact = np.vstack(
-        [s.reshape(-1, len(theta)) for s in whitened_innovation_sensitivities(problem, theta, here)]
-    )
+    exact = np.vstack([s.reshape(-1, len(theta)) for s in problem.whitened_slopes(theta, here)])
     np.testing.assert_allclose(exact / size, J.T / size, atol=1e-6)
     expected = J @ J.T + 0.5 * problem.output_problem.samples * L @ L.T
     expected[: problem.n_model, : problem.n_model] += np.diag(

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.sysid.estimators import filter_error
 from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
 from host.sysid.models import LinearModel, Maneuver, model_from
 from scipy import signal
@@ -167,7 +166,7 @@ def test_a_filter_that_turns_out_singular_leaves_the_other_noise(
     def singular(*_: object) -> None:
         raise np.linalg.LinAlgError("Singular matrix")
 
-    monkeypatch.setattr(filter_error, "fisher_scoring", singular)
+    monkeypatch.setattr("host.sysid.numerics.filter_problem.FilterProblem.scoring", singular)
     found = fit_by_evidence(short_period(), [flown("coloured")], AIRSPEED_MPS)
     assert found.method == "output-error"
     assert "gust: filter-error-gust does not converge on mine" in found.remarks[0]

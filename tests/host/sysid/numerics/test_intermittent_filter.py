@@ -6,12 +6,8 @@ import numpy as np
 import pytest
 from host.arrays import BoolArray
 from host.sysid.models import LinearModel, Maneuver, Parameter, Term
-from host.sysid.numerics.filter_problem import FilterProblem, InnovationLikelihood
-from host.sysid.numerics.filter_scoring import (
-    fisher_scoring,
-    total_information,
-    whitened_innovation_sensitivities,
-)
+from host.sysid.numerics.filter_problem import FilterProblem
+from host.sysid.numerics.innovation_problem import InnovationLikelihood
 from host.sysid.numerics.process_noise import discrete_noise
 from host.sysid.numerics.restricted_likelihood import restricted_slopes
 from scipy import stats
@@ -151,11 +147,9 @@ def test_gradient_and_slopes_are_those_of_differences() -> None:
     )
     problem, theta = problem_of("at random", more=(whole,))
     here = known(problem.evaluate(theta))
-    information, gradient = total_information(
-        problem.output_problem, theta, *fisher_scoring(problem, theta, here)
-    )
+    information, gradient = problem.total(theta, *problem.scoring(theta, here))
     size = np.sqrt(np.diag(information))
-    exact = whitened_innovation_sensitivities(problem, theta, here)[0]
+    exact = problem.whitened_slopes(theta, here)[0]
     for k, name in enumerate(problem.names):
         width = np.zeros(len(theta))
         width[k] = 1e-4 / size[k]
@@ -184,7 +178,7 @@ def test_information_is_the_covariance_of_the_score() -> None:
             x = one.step @ np.concatenate([x, drive]) + kick @ rng.standard_normal(3)
         drawn = FilterProblem(problem.model, [replace(problem.maneuvers[0], outputs=y)], PROCESS)
         point = known(drawn.evaluate(theta))
-        [information], [score] = fisher_scoring(drawn, theta, point)
+        [information], [score] = drawn.scoring(theta, point)
         scores.append(score)
         told.append(information)
     mean = np.mean(told, axis=0)

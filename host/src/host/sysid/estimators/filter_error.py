@@ -12,19 +12,17 @@ from host.errors import IdentificationError
 from host.sysid.estimators.hac_inflation import hac_inflation, inflation_lines
 from host.sysid.estimators.innovation_search import InnovationObjective, first_noise, noise_floor
 from host.sysid.estimators.noise_model_comparison import compare_noise_models
+from host.sysid.estimators.output_error_fit import fit_output_error
 from host.sysid.estimators.start_values import start_values
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.filter_problem import FilterProblem, InnovationLikelihood
-from host.sysid.numerics.filter_scoring import (
-    fisher_scoring,
-    total_information,
-    whitened_innovation_sensitivities,
-)
+from host.sysid.numerics.equation_filter_problem import innovation_problem, needs_compiler
+from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.gauss_newton import GaussNewtonResult, damped_step, gauss_newton
 from host.sysid.numerics.information_inverse import covariance_from_information
-from host.sysid.numerics.intermittent_filter import needs_compiler
+from host.sysid.numerics.innovation_problem import InnovationLikelihood, InnovationProblem
 from host.sysid.numerics.maneuver_agreement import maneuver_influence
 from host.sysid.numerics.output_error import minimise
 from host.sysid.numerics.restricted_likelihood import restricted_slopes
@@ -47,16 +45,17 @@ def fit_filter_error(
 ) -> FitResult:
     """Fit by filter error.
 
-    The residuals are the innovations of a steady-state Kalman filter; the search is Fisher scoring
-    on their exact Gaussian likelihood (Jategaonkar, Flight Vehicle System Identification, 2nd ed.,
-    ch. 5; Klein & Morelli, Aircraft System Identification, ch. 6).
+    The residuals are the innovations of a Kalman filter, extended where a model has equations; the
+    search is Fisher scoring on their exact Gaussian likelihood (Jategaonkar, Flight Vehicle System
+    Identification, 2nd ed., ch. 5; Klein & Morelli, Aircraft System Identification, ch. 6).
 
     Parameters
     ----------
     model, maneuvers
         Model and data. A gust can be a state of its own, its entries tied to those of alpha.
     process : tuple of str, optional
-        States driven by white process noise; by default all whose equation has a free parameter.
+        States driven by white process noise; by default those of the model's equations, or all
+        whose equation has a free parameter.
     start : Array, optional
         Start of the vector without noise parameters; by default from output error.
     noise : Array, optional
@@ -69,48 +68,40 @@ def fit_filter_error(
         Inflate standard errors by the autocorrelation of the scores (`hac_inflation`).
     restricted : bool
         Take one step on to the optimum of the restricted likelihood (`restricted_likelihood`):
-        what the constants of short maneuvers take of slow noise biases nothing then.
+        what the constants of short maneuvers take of slow noise biases nothing then. Equations
+        have none.
 
     Raises
     ------
     IdentificationError
-        If no start is finite, or there is no compiler for so many samples with missing outputs.
+        If no start is finite, or there is no compiler for a filter of so many samples.
     """
-    slow = needs_compiler(maneuvers)
+    slow = needs_compiler(model, maneuvers)
     if slow:
         raise IdentificationError(slow)
-    if process is None:
-        rows = {t.row for t in model.terms if t.matrix == "A"}
-        process = tuple(model.states[i] for i in sorted(rows))
-    problem = FilterProblem(model, maneuvers, process)
-    first = (
-        start_values(problem.output_problem)
-        if start is None
-        else np.asarray(start, dtype=np.float64)
-    )
-    theta = (
-        _first_guess(problem, first, fit_first=start is None)
-        if noise is None
-        else np.concatenate([first, noise])
-    )
-    floor = noise_floor(maneuvers, theta[problem.n_model : problem.n_model + len(process)])
-    objective = _FilterError(problem, floor)
+    problem = innovation_problem(model, maneuvers, _driven(model) if process is None else process)
+    if noise is None:
+        first, theta = _first_guess(problem, start)
+    else:
+        first = start_values(problem.output_problem) if start is None else start
+        theta = np.concatenate([first, noise])
+    n_noise = problem.n_model + len(problem.process)
+    floor = noise_floor(maneuvers, theta[problem.n_model : n_noise])
+    objective = InnovationObjective(problem, floor)
     ends = {"step_limit": NEAR_BOUNDS} if roughly else {}
     found = gauss_newton(objective, theta, max_iterations=MAX_ITERATIONS, **ends)
     if found is None:
         raise IdentificationError(f"model {model.name}: the Kalman filter fails at the start")
     covariance = covariance_from_information(found.information)
     slopes: Array = np.zeros((len(maneuvers), len(theta)))
-    if restricted:
+    if restricted and isinstance(problem, FilterProblem):
         found, slopes = _restricted(problem, objective, found, covariance)
     theta, point = found.theta, found.trial
     factor: Array = np.ones(len(theta))
     if hac:
         white = [point.whitened(k, point.as_filtered(k)) for k in range(len(maneuvers))]
         steps_s = [m.dt_s for m in maneuvers]
-        factor = hac_inflation(
-            whitened_innovation_sensitivities(problem, theta, point), white, steps_s, covariance
-        )
+        factor = hac_inflation(problem.whitened_slopes(theta, point), white, steps_s, covariance)
     n_model = problem.n_model
     warnings = []
     if not found.converged:
@@ -118,7 +109,7 @@ def fit_filter_error(
     warnings += inflation_lines(model, factor)
     result = FitResult(
         method="filter error",
-        model=model,
+        model=problem.output_problem.model_at(theta[:n_model]),
         names=problem.names,
         estimate=theta,
         covariance=covariance * np.outer(factor, factor),
@@ -137,8 +128,8 @@ def fit_filter_error(
             "last_step_bounds": float(found.step),
             "cost": point.cost,
             "hac_inflation": factor,
-            "process_deviation": np.exp(theta[n_model : n_model + len(process)]),
-            "noise_deviation": np.exp(theta[n_model + len(process) :]),
+            "process_deviation": np.exp(theta[n_model:n_noise]),
+            "noise_deviation": np.exp(theta[n_noise:]),
             **maneuver_influence(
                 objective.parts, list(np.array(objective.scores) - slopes), covariance
             ),
@@ -174,13 +165,12 @@ def information_at(
     point = problem.evaluate(theta)
     if point is None:
         raise IdentificationError(f"model {model.name}: the Kalman filter fails at these values")
-    parts, scores = fisher_scoring(problem, theta, point)
-    return total_information(problem.output_problem, theta, parts, scores)[0]
+    return problem.total(theta, *problem.scoring(theta, point))[0]
 
 
 def _restricted(
     problem: FilterProblem,
-    objective: _FilterError,
+    objective: InnovationObjective,
     found: GaussNewtonResult[InnovationLikelihood],
     covariance: Array,
 ) -> tuple[GaussNewtonResult[InnovationLikelihood], Array]:
@@ -201,29 +191,29 @@ def _restricted(
     return replace(found, theta=theta, trial=trial), slopes
 
 
-def _first_guess(problem: FilterProblem, first: Array, *, fit_first: bool) -> Array:
-    """Return the estimate of output error, its residuals split between both kinds of noise."""
-    optimum = minimise(problem.output_problem, first, max_iterations=15 if fit_first else 0)
-    deviation = problem.output_problem.residual_deviation(optimum.residuals)
-    A, _, C, _ = problem.model.matrices(optimum.theta)
-    return np.concatenate([optimum.theta, first_noise(A, C, problem.process_index, deviation)])
+def _driven(model: LinearModel) -> tuple[str, ...]:
+    """Return the states that process noise drives where nobody says which."""
+    if isinstance(model, NonlinearModel):
+        return model.process_noise
+    rows = {t.row for t in model.terms if t.matrix == "A"}
+    return tuple(model.states[i] for i in sorted(rows))
 
 
-class _FilterError(InnovationObjective[InnovationLikelihood]):
-    """Cost of the steady-state filter."""
-
-    def __init__(self, problem: FilterProblem, floor: Array) -> None:
-        super().__init__(problem.output_problem, floor)
-        self._problem = problem
-
-    def evaluate(self, theta: Array) -> InnovationLikelihood | None:
-        return self._problem.evaluate(theta)
-
-    def score(self, theta: Array, trial: InnovationLikelihood) -> tuple[list[Array], list[Array]]:
-        try:
-            return fisher_scoring(self._problem, theta, trial)
-        except np.linalg.LinAlgError as error:
-            raise IdentificationError(
-                f"model {self._problem.model.name}: the Kalman filter's gain has no slopes at its"
-                " estimates; these data do not determine the model"
-            ) from error
+def _first_guess(problem: InnovationProblem, start: Array | None) -> tuple[Array, Array]:
+    """Return where output error begins, and its estimate with its residuals split between both
+    kinds of noise."""
+    outputs, model = problem.output_problem, problem.model
+    if isinstance(model, NonlinearModel):
+        fitted = fit_output_error(
+            model, problem.maneuvers, coloured_noise=False, start=start, multiple_starts=False
+        )
+        problem.set_steps(fitted.standard_error)
+        first = estimate = fitted.estimate
+        model, residuals = fitted.model, [r.T for r in fitted.residuals]
+    else:
+        first = start_values(outputs) if start is None else np.asarray(start, dtype=np.float64)
+        optimum = minimise(outputs, first, max_iterations=15 if start is None else 0)
+        estimate, residuals = optimum.theta, optimum.residuals
+    A, _, C, _ = model.matrices(estimate)
+    deviation = outputs.residual_deviation(residuals)
+    return first, np.concatenate([estimate, first_noise(A, C, problem.process_index, deviation)])

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Sequence
 
 import numpy as np
 
 from host.arrays import Array, BoolArray
+from host.errors import IdentificationError
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.numerics.filter_scoring import total_information
-from host.sysid.numerics.gauss_newton import Objective, StepLine, Trial, free_of_bounds
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics.gauss_newton import Objective, StepLine, free_of_bounds
+from host.sysid.numerics.innovation_problem import InnovationLikelihood, InnovationProblem
 
 # Where the noise of a sensor tends to zero, Fisher's information overstates the curvature and all
 # steps are too short by the same share. A longer one is tried at a fifth of the cost of new
@@ -72,32 +71,37 @@ def noise_floor(maneuvers: Sequence[Maneuver], process: Array) -> Array:
     return np.asarray(np.log(NOISE_FLOOR) + np.concatenate([process, np.log(spread)]))
 
 
-class InnovationObjective(Objective[Trial]):
+class InnovationObjective(Objective[InnovationLikelihood]):
     """Cost of a filter's innovations; deviations of the noise do not fall below `floor`.
 
     Parameters
     ----------
-    outputs : OutputProblem
-        Bounds and priors of the unknowns of the model.
+    problem : InnovationProblem
     floor : Array
         Of the logarithms of the deviations.
     """
 
-    def __init__(self, outputs: OutputProblem, floor: Array) -> None:
-        self._noise = slice(len(outputs.names), None)
-        self._outputs = outputs
+    def __init__(self, problem: InnovationProblem, floor: Array) -> None:
+        outputs = problem.output_problem
+        self._problem = problem
+        self._noise = slice(problem.n_model, None)
         self._lower = np.concatenate([outputs.lower, floor])
         self._upper = np.concatenate([outputs.upper, np.full(len(floor), np.inf)])
         self.parts: list[Array] = []  # Fisher's information by maneuver where last asked for
         self.scores: list[Array] = []
 
-    @abstractmethod
-    def score(self, theta: Array, trial: Trial) -> tuple[list[Array], list[Array]]:
-        """Return Fisher information and negative gradient of the cost, per maneuver."""
+    def evaluate(self, theta: Array) -> InnovationLikelihood | None:
+        return self._problem.evaluate(theta)
 
-    def normal(self, theta: Array, trial: Trial) -> tuple[Array, Array]:
-        self.parts, self.scores = self.score(theta, trial)
-        return total_information(self._outputs, theta, self.parts, self.scores)
+    def normal(self, theta: Array, trial: InnovationLikelihood) -> tuple[Array, Array]:
+        try:
+            self.parts, self.scores = self._problem.scoring(theta, trial)
+        except np.linalg.LinAlgError as error:
+            raise IdentificationError(
+                f"model {self._problem.model.name}: the Kalman filter's gain has no slopes at its"
+                " estimates; these data do not determine the model"
+            ) from error
+        return self._problem.total(theta, self.parts, self.scores)
 
     def free(self, theta: Array, gradient: Array) -> BoolArray:
         return free_of_bounds(theta, gradient, self._lower, self._upper)
@@ -110,7 +114,9 @@ class InnovationObjective(Objective[Trial]):
         )
         return np.clip(proposal, self._lower, self._upper)
 
-    def adjust_step(self, line: StepLine, reached: tuple[Array, Trial]) -> tuple[Array, Trial]:
+    def adjust_step(
+        self, line: StepLine, reached: tuple[Array, InnovationLikelihood]
+    ) -> tuple[Array, InnovationLikelihood]:
         """Return the best of a step doubled in length as long as the cost falls, or shortened.
 
         The length is that of the parabola through both costs and the slope at the start.
@@ -129,8 +135,8 @@ class InnovationObjective(Objective[Trial]):
         return best
 
     def _better(
-        self, line: StepLine, length: float, best: tuple[Array, Trial]
-    ) -> tuple[Array, Trial]:
+        self, line: StepLine, length: float, best: tuple[Array, InnovationLikelihood]
+    ) -> tuple[Array, InnovationLikelihood]:
         """Return the point at some length of a step where its cost is lower, else `best`."""
         proposal = self.apply_step(line.theta, line.step, length)
         trial = self.evaluate(proposal)

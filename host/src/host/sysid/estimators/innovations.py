@@ -10,12 +10,9 @@ import numpy as np
 from host.arrays import Array, BoolArray
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.coloured_residuals import coloured_score_covariance
-from host.sysid.numerics.equation_filter_problem import EquationFilterProblem
-from host.sysid.numerics.filter_problem import FilterProblem
-from host.sysid.numerics.filter_scoring import whitened_innovation_sensitivities
+from host.sysid.numerics.equation_filter_problem import innovation_problem
 from host.sysid.numerics.information_inverse import covariance_from_information
 
 PROCESS = "log_process."
@@ -56,11 +53,8 @@ class Innovations:
 
         None if the filter fails.
         """
-        if isinstance(model, NonlinearModel):
-            filtered = EquationFilterProblem(model, changed, self.process).evaluate(self.theta)
-            return None if filtered is None else filtered.scaled
         # e = y - C x_predicted (Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 5).
-        point = FilterProblem(model, changed, self.process).evaluate(self.theta)
+        point = innovation_problem(model, changed, self.process).evaluate(self.theta)
         if point is None:
             return None
         return [point.as_filtered(k) for k in range(len(changed))]
@@ -94,20 +88,17 @@ def innovations_of(
     """Return the innovations of a filter-error result on this model; None if the filter fails."""
     theta, covariance = result.estimate, result.covariance_white
     process = driven_states(result)
-    if isinstance(model, NonlinearModel):
-        return _of_equations(result, model, maneuvers, process)
-    problem = FilterProblem(model, maneuvers, process)
+    problem = innovation_problem(model, maneuvers, process)
+    count = problem.n_model
+    problem.set_steps(result.standard_error[:count])
     point = problem.evaluate(theta)
     if point is None:
         return None
-    sensitivities = whitened_innovation_sensitivities(problem, theta, point)
-    count = problem.n_model
-    model_sensitivities = [
-        sensitivity.reshape(-1, len(theta))[:, :count] for sensitivity in sensitivities
-    ]
+    sensitivities = problem.whitened_slopes(theta, point)
+    own = [J.reshape(-1, len(theta))[:, :count] for J in sensitivities]
     inverse = np.zeros_like(covariance)
     inverse[:count, :count] = covariance_from_information(
-        np.diag(problem.output_problem.prior_precision) + sum(J.T @ J for J in model_sensitivities)
+        np.diag(problem.output_problem.prior_precision) + sum(J.T @ J for J in own)
     )
     return Innovations(
         theta=theta,
@@ -118,37 +109,6 @@ def innovations_of(
         whiten=point.whitened,
         sampled=[m.sampled for m in maneuvers],
         sensitivities=sensitivities,
-    )
-
-
-def _of_equations(
-    result: FitResult,
-    model: NonlinearModel,
-    maneuvers: Sequence[Maneuver],
-    process: tuple[str, ...],
-) -> Innovations | None:
-    """Return the same of equations; they are of unit variance already."""
-    problem = EquationFilterProblem(model, maneuvers, process)
-    theta, count = result.estimate, problem.n_model
-    problem.set_steps(result.standard_error[:count])
-    point = problem.evaluate(theta)
-    if point is None:
-        return None
-    _, _, slopes = problem.scoring(theta, point)
-    inverse = np.zeros_like(result.covariance)
-    shared = [J.reshape(-1, len(theta))[:, :count] for J in slopes]
-    inverse[:count, :count] = covariance_from_information(
-        np.diag(problem.output_problem.prior_precision) + sum(J.T @ J for J in shared)
-    )
-    return Innovations(
-        theta=theta,
-        covariance=result.covariance_white,
-        inverse=inverse,
-        process=process,
-        e=point.scaled,
-        whiten=lambda _, e: e,
-        sampled=[m.sampled for m in maneuvers],
-        sensitivities=slopes,
     )
 
 

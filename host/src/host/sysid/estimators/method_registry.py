@@ -26,6 +26,7 @@ NO_MOTION = 1e-30  # in any unit: an output that moves less holds nothing, and i
 _HERE = "host.sysid.estimators"
 _EQUATION_ERROR = f"{_HERE}.equation_error:fit_equation_error"
 _OUTPUT_ERROR = f"{_HERE}.output_error_fit:fit_output_error"
+_FILTER_ERROR = f"{_HERE}.filter_error:fit_filter_error"
 _SETTLING = f"{_HERE}.settling:settling_lines"
 _FORGETTING = Quantity("", 0.0, 1.0, "weight of the past per sample", above=True)
 
@@ -63,9 +64,9 @@ METHODS: dict[str, Method] = {
         estimates_delays=True,
     ),
     "filter-error": Method(
-        function=f"{_HERE}.filter_error:fit_filter_error",
+        function=_FILTER_ERROR,
         about="maximum likelihood with process noise",
-        equations=f"{_HERE}.filter_error_equations:fit_equation_filter_error",
+        equations=_FILTER_ERROR,
         valid_in=("white", "gust"),
     ),
     "frequency-equation-error": Method(

@@ -22,11 +22,6 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
 from host.sysid.numerics.filter_problem import FilterProblem
-from host.sysid.numerics.filter_scoring import (
-    fisher_scoring,
-    total_information,
-    whitened_innovation_sensitivities,
-)
 from host.sysid.numerics.information_inverse import identified_inverse
 
 SIGNIFICANCE = 0.01  # of right models are said to lack an effect of their inputs
@@ -89,11 +84,9 @@ def missing_control(
     point = problem.evaluate(theta)
     if point is None:
         return None
-    information, score = total_information(
-        problem.output_problem, theta, *fisher_scoring(problem, theta, point)
-    )
+    information, score = problem.total(theta, *problem.scoring(theta, point))
     coloured = np.zeros_like(information)
-    slopes = whitened_innovation_sensitivities(problem, theta, point)
+    slopes = problem.whitened_slopes(theta, point)
     for k, (J, m) in enumerate(zip(slopes, maneuvers, strict=True)):
         white = point.whitened(k, point.as_filtered(k))
         for part in score_covariances(white, J, m.sampled):

@@ -26,7 +26,7 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.intermittent_filter import needs_compiler
+from host.sysid.numerics.equation_filter_problem import needs_compiler
 
 GUST, FILTER = "filter-error-gust", "filter-error"
 MEMORY, WHITE = "output-error", "output-error-white"
@@ -145,7 +145,7 @@ def fit_by_evidence(
 
 def no_filter(model: LinearModel, maneuvers: Sequence[Maneuver]) -> str:
     """Return why no Kalman filter fits this model to these data; empty where one does."""
-    why = needs_compiler(maneuvers)
+    why = needs_compiler(model, maneuvers)
     if why:
         return why
     if model.known_noise:

@@ -33,7 +33,7 @@ from host.sysid.models.state_space_model import (
     without_outputs,
 )
 from host.sysid.models.templates import TEMPLATES, Trim, template
-from host.sysid.numerics.intermittent_filter import needs_compiler
+from host.sysid.numerics.equation_filter_problem import needs_compiler
 
 AXIS_OF = {
     "longitudinal": ("elevator_rad",),
@@ -137,7 +137,7 @@ def _default_method(
     if not (trim.known and vane in model.states and vane in model.outputs):
         return "output-error-white", ""
     data = [m.cut(model) for m in used]
-    why = needs_compiler(data) or no_filter_step(used, model)
+    why = needs_compiler(model, data) or no_filter_step(used, model)
     return ("output-error-white", f"{why}; output error stands instead") if why else (GUST, "")
 
 

@@ -10,15 +10,26 @@ over a hundredth, six degrees of freedom in gusts stood still half a bound besid
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
-from host.arrays import Array, IntArray
+from host.arrays import Array
+from host.compiled import has_compiler
 from host.errors import IdentificationError
+from host.extras import install_hint
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.equation_filter import filter_equations
+from host.sysid.numerics.filter_problem import FilterProblem
+from host.sysid.numerics.innovation_problem import (
+    Filtered,
+    InnovationLikelihood,
+    InnovationProblem,
+    InnovationSlopes,
+)
+from host.sysid.numerics.intermittent_filter import SequentialInnovations
 from host.sysid.numerics.nonlinear_problem import Given, NonlinearProblem, finite
 from host.sysid.numerics.process_noise import air_states, steady_covariance
 
@@ -26,35 +37,30 @@ STEP_BOUNDS = 1e-4  # of a bound: differences
 LOG_STEP = 1e-5  # of a logarithm of a deviation
 # A filter corrects what a step misses: at most two from sample to sample, one of a quick record.
 MOST_FILTER_STEPS, QUICK_S = 2, 0.0125
+SAMPLES_WITHOUT_COMPILER = 500  # of a filter that Python runs in minutes
 
 
-@dataclass(slots=True)
-class EquationLikelihood:
-    """Result of the filter at one set of unknowns, per maneuver (samples, outputs) each.
-
-    Attributes
-    ----------
-    e : list of Array
-        Measured less predicted one sample ahead.
-    white, power : list of Array
-        Independent innovations and their variances.
-    cost : float
-        Negative log likelihood and prior, up to a constant.
-    """
-
-    e: list[Array]
-    white: list[Array]
-    power: list[Array]
-    cost: float
-
-    @property
-    def scaled(self) -> list[Array]:
-        """Innovations of unit variance."""
-        return [w / np.sqrt(s) for w, s in zip(self.white, self.power, strict=True)]
+def innovation_problem(
+    model: LinearModel, maneuvers: Sequence[Maneuver], process: tuple[str, ...]
+) -> InnovationProblem:
+    """Return the problem of filter error of a linear model, or of a user's equations."""
+    if isinstance(model, NonlinearModel):
+        return EquationFilterProblem(model, maneuvers, process)
+    return FilterProblem(model, maneuvers, process)
 
 
-class EquationFilterProblem:
-    """Innovations as a function of the unknowns, log process and log measurement deviations.
+def needs_compiler(model: LinearModel, maneuvers: Sequence[Maneuver]) -> str:
+    """Return why a filter takes hours over these maneuvers; empty where it does not."""
+    own = isinstance(model, NonlinearModel)
+    samples = sum(m.samples for m in maneuvers if own or m.held)
+    if has_compiler() or samples <= SAMPLES_WITHOUT_COMPILER:
+        return ""
+    what = "of equations" if own else "of columns with missing rows"
+    return f"a filter {what} takes hours without numba: {install_hint('numba')}"
+
+
+class EquationFilterProblem(InnovationProblem):
+    """The same of equations.
 
     Parameters
     ----------
@@ -62,125 +68,67 @@ class EquationFilterProblem:
     maneuvers : sequence of Maneuver
     process : tuple of str
         States that white process noise drives.
-
-    Raises
-    ------
-    IdentificationError
-        If a state of `process` is none of the model.
     """
 
     def __init__(
         self, model: NonlinearModel, maneuvers: Sequence[Maneuver], process: tuple[str, ...]
     ) -> None:
-        strangers = [s for s in process if s not in model.states]
-        if strangers:
-            raise IdentificationError(
-                f"process noise on {', '.join(strangers)}; states are {', '.join(model.states)}"
-            )
-        self.output_problem = NonlinearProblem(model, maneuvers)
-        self.model = model
-        self.maneuvers = tuple(maneuvers)
-        self.process = process
-        self.process_index = [model.states.index(s) for s in process]
-        self.n_model = len(self.output_problem.names)
-        self.names = (
-            *self.output_problem.names,
-            *(f"log_process.{s}" for s in process),
-            *(f"log_noise.{y}" for y in model.outputs),
-        )
+        self._outputs = NonlinearProblem(model, maneuvers)
+        super().__init__(self._outputs, process)
+        self._source = model.source
         self._run = model.source.code.loop(filter_equations)
         late = {y: k for k, d in enumerate(model.delays, len(model.parameters)) for y in d.outputs}
         self._late = [late.get(y, -1) for y in model.outputs]
         self._leader = np.array([self._late.index(k) for k in self._late], dtype=np.int64)
-        self._steps = np.zeros(0)
+        self.set_steps(np.zeros(self.n_model))
 
-    def noise(self, theta: Array) -> tuple[Array, Array]:
-        """Return spectral density of every state's process noise and variance of every output."""
-        split = self.n_model + len(self.process)
-        intensity = np.zeros(len(self.model.states))
-        with np.errstate(over="ignore"):
-            intensity[self.process_index] = np.exp(2.0 * theta[self.n_model : split])
-            return intensity, np.exp(2.0 * theta[split:])
-
-    def evaluate(self, theta: Array) -> EquationLikelihood | None:
+    def evaluate(self, theta: Array) -> InnovationLikelihood | None:
         """Return innovations and cost; None where the filter or the model fails."""
-        found = EquationLikelihood([], [], [], 0.0)
-        cost = 0.0
+        runs: list[Filtered] = []
         for number in range(len(self.maneuvers)):
             run = self._filtered(number, theta)
             if run is None:
                 return None
-            e, white, power = run
-            found.e.append(e)
-            found.white.append(white)
-            found.power.append(power)
-            cost += 0.5 * float(np.sum(white**2 / power + np.log(power)))
-        deviation = theta[: self.n_model] - self.output_problem.prior_mean
-        found.cost = cost + 0.5 * float(np.sum(self.output_problem.prior_precision * deviation**2))
-        return found if np.isfinite(found.cost) else None
+            runs.append(run)
+        return self.likelihood(theta, runs)
 
     def set_steps(self, bounds: Array) -> None:
         """Set the steps of the differences from the bounds of the unknowns of the model."""
         own = np.where(bounds > 0.0, STEP_BOUNDS * bounds, 1e-6)
         self._steps = np.concatenate([own, np.full(len(self.names) - self.n_model, LOG_STEP)])
 
-    def scoring(
-        self, theta: Array, point: EquationLikelihood
-    ) -> tuple[list[Array], list[Array], list[Array]]:
-        """Return Fisher information, negative gradient and slopes of the innovations by maneuver.
+    def slopes(self, theta: Array, point: InnovationLikelihood) -> list[InnovationSlopes]:
+        """Return slopes of every maneuver's innovations."""
+        return [
+            self._differences(number, theta, run).slopes(self.columns(number))
+            for number, run in enumerate(point.runs)
+            if isinstance(run, SequentialInnovations)
+        ]
 
-        Of an innovation w of variance s, given those before, the information is dw dw / s + ds ds /
-        (2 s^2) (Klein & Morelli, Aircraft System Identification, ch. 6).
+    def _differences(
+        self, number: int, theta: Array, run: SequentialInnovations
+    ) -> SequentialInnovations:
+        """Return a run of the filter with slopes."""
+        active = self.columns(number)
+        by_white, by_power = (np.empty((*run.e.shape, len(active))) for _ in range(2))
+        for k, unknown in enumerate(active):
+            for step in (self._steps[unknown], -self._steps[unknown]):
+                moved = theta.copy()
+                moved[unknown] += step
+                there = self._filtered(number, moved)
+                if there is not None:
+                    break
+            else:
+                raise IdentificationError(
+                    f"model {self.model.name}: the filter has no finite slope"
+                )
+            by_white[..., k] = run.whitened((there.independent - run.independent) / step)
+            by_power[..., k] = (there.variance - run.variance) / step / run.variance
+        return replace(run, by_independent=by_white, by_variance=by_power)
 
-        Returns
-        -------
-        list of Array, shape (P, P)
-        list of Array, shape (P,)
-        list of Array, shape (samples, outputs, P)
-            Of the innovations over their deviation.
-        """
-        size = len(theta)
-        parts: list[Array] = []
-        scores: list[Array] = []
-        slopes: list[Array] = []
-        for number, (white, power) in enumerate(zip(point.white, point.power, strict=True)):
-            active = self._active(number)
-            by_white, by_power = (np.empty((white.size, len(active))) for _ in range(2))
-            for k, unknown in enumerate(active):
-                dw, ds = self._difference(number, theta, int(unknown), white, power)
-                by_white[:, k] = (dw / np.sqrt(power)).ravel()
-                by_power[:, k] = (ds / power).ravel()
-            unit = (white / np.sqrt(power)).ravel()
-            information, gradient = np.zeros((size, size)), np.zeros(size)
-            information[np.ix_(active, active)] = (
-                by_white.T @ by_white + 0.5 * by_power.T @ by_power
-            )
-            gradient[active] = -by_white.T @ unit - 0.5 * by_power.T @ (1.0 - unit**2)
-            whole = np.zeros((white.size, size))
-            whole[:, active] = by_white
-            parts.append(information)
-            scores.append(gradient)
-            slopes.append(whole.reshape(*white.shape, size))
-        return parts, scores, slopes
-
-    def _active(self, number: int) -> IntArray:
-        noise = np.arange(self.n_model, len(self.names))
-        return np.concatenate([self.output_problem.columns(number), noise])
-
-    def _difference(
-        self, number: int, theta: Array, unknown: int, white: Array, power: Array
-    ) -> tuple[Array, Array]:
-        for step in (self._steps[unknown], -self._steps[unknown]):
-            moved = theta.copy()
-            moved[unknown] += step
-            run = self._filtered(number, moved)
-            if run is not None:
-                return (run[1] - white) / step, (run[2] - power) / step
-        raise IdentificationError(f"model {self.model.name}: the filter has no finite slope")
-
-    def _filtered(self, number: int, theta: Array) -> tuple[Array, Array, Array] | None:
-        """Run the filter over a maneuver: innovations, independent ones, their variances."""
-        problem, model, maneuver = self.output_problem, self.model, self.maneuvers[number]
+    def _filtered(self, number: int, theta: Array) -> SequentialInnovations | None:
+        """Run the filter over a maneuver; None if it fails."""
+        problem, model, maneuver = self._outputs, self.model, self.maneuvers[number]
         problem.choose_step(theta)
         g = problem.given(number, theta)
         n, outputs = len(model.states), len(model.outputs)
@@ -201,11 +149,14 @@ class EquationFilterProblem:
             self._substeps(maneuver.dt_s), problem.ramp, e, white, power,
         ):  # fmt: skip
             return None
-        return (e, white, power) if np.isfinite(e).all() and np.isfinite(white).all() else None
+        if not (np.isfinite(e).all() and np.isfinite(white).all()):
+            return None
+        no_slopes = np.zeros((*e.shape, 0))
+        return SequentialInnovations(e, white, power, no_slopes, no_slopes)
 
     def _first_covariance(self, g: Given, intensity: Array) -> Array:
         """Return the covariance of the states at the first sample: of air without a start."""
-        source, states = self.model.source, self.model.states
+        source, states = self._source, self.model.states
         n, m = len(states), g.inputs.shape[1]
         result, f, A = np.zeros((n, n)), np.zeros(n), np.zeros((n, n))
         air = [k for k in air_states(states) if states[k] not in self.model.initial_states]
@@ -225,4 +176,4 @@ class EquationFilterProblem:
 
     def _substeps(self, dt_s: float) -> int:
         most = 1 if dt_s <= QUICK_S else MOST_FILTER_STEPS
-        return min(self.output_problem.substeps, most)
+        return min(self._outputs.substeps, most)

@@ -1,13 +1,12 @@
-"""Likelihood of a steady-state Kalman filter's innovations: the problem of filter error.
+"""Innovations of a linear model's Kalman filter, with exact slopes by all unknowns.
 
-The unknowns are the parameters of the model, biases, initial states, the process noise of chosen
-states and the measurement noise of every output.
+Where every output is measured at every sample the gain is the steady one; else the filter follows
+what was measured, and begins as if all outputs had been measured before the first sample.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,90 +14,29 @@ from host.arrays import Array, IntArray
 from host.errors import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.intermittent_filter import (
-    FilterEquations,
-    IntermittentInnovations,
-    filter_intermittent,
+from host.sysid.numerics.filter_sensitivities import GainSensitivities, gain_sensitivities
+from host.sysid.numerics.innovation_problem import (
+    Filtered,
+    InnovationLikelihood,
+    InnovationProblem,
+    InnovationSlopes,
 )
+from host.sysid.numerics.intermittent_filter import FilterEquations, filter_intermittent
 from host.sysid.numerics.output_error_problem import OutputProblem
-from host.sysid.numerics.process_noise import discrete_noise
-from host.sysid.numerics.riccati import filter_innovations, predicted_covariance
+from host.sysid.numerics.recursion import propagate
+from host.sysid.numerics.riccati import (
+    SteadyInnovations,
+    SteadyStateFilter,
+    filter_innovations,
+    steady_state_filter,
+)
 from host.sysid.numerics.sampled_model import SampledModel
 
 SAME_PERIOD = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
-class SteadyStateFilter:
-    """Steady-state Kalman filter of one sample period.
-
-    Attributes
-    ----------
-    F : Array, shape (n, n)
-        State transition over a sample.
-    Q : Array, shape (n, n)
-        Covariance of the process noise of a sample.
-    P : Array, shape (n, n)
-        Covariance of the predicted state.
-    S : Array, shape (p, p)
-        Covariance of the innovations.
-    whitener : Array, shape (p, p)
-        Inverse Cholesky factor of S: it makes innovations white, of unit variance.
-    K : Array, shape (n, p)
-        Gain of the measurement update.
-    """
-
-    F: Array
-    Q: Array
-    P: Array
-    S: Array
-    whitener: Array
-    K: Array
-
-
-@dataclass(slots=True)
-class InnovationLikelihood:
-    """Result of the filter at one set of parameters.
-
-    Attributes
-    ----------
-    z : list of Array
-        Per maneuver what `filter_innovations` returns; empty where outputs are missing.
-    e : list of Array, shape (samples, p)
-        Innovations per maneuver, zero where nothing was measured.
-    filters : list of SteadyStateFilter
-        Of each maneuver, all outputs measured; the same for all of one sample period.
-    intermittent : list of IntermittentInnovations or None
-        Of each maneuver some of whose outputs were not measured at every sample.
-    cost : float
-        Negative log likelihood and prior, up to a constant.
-    """
-
-    z: list[Array]
-    e: list[Array]
-    filters: list[SteadyStateFilter]
-    intermittent: list[IntermittentInnovations | None]
-    cost: float
-
-    def as_filtered(self, number: int) -> Array:
-        """Return innovations of a maneuver as its filter makes them, (samples, p).
-
-        The steady filter takes all outputs of a sample at once, and they are correlated by S; the
-        intermittent one takes them in turn.
-        """
-        missing = self.intermittent[number]
-        return self.e[number] if missing is None else missing.independent
-
-    def whitened(self, number: int, innovations: Array) -> Array:
-        """Return innovations of a maneuver, those of `as_filtered`, with unit variance."""
-        missing = self.intermittent[number]
-        if missing is None:
-            return np.asarray(innovations @ self.filters[number].whitener.T)
-        return np.asarray(innovations / np.sqrt(missing.variance))
-
-
-class FilterProblem:
-    """Innovations as a function of parameters, log process and log measurement deviations.
+class FilterProblem(InnovationProblem):
+    """Innovations of a linear model.
 
     Parameters
     ----------
@@ -121,37 +59,8 @@ class FilterProblem:
             raise IdentificationError(
                 "filter error has no delays: estimate them by output error and shift the data"
             )
-        unknown_states = [s for s in process if s not in model.states]
-        if unknown_states:
-            raise IdentificationError(
-                f"process noise on {', '.join(unknown_states)};"
-                f" states are {', '.join(model.states)}"
-            )
-        self.output_problem = OutputProblem(model, maneuvers)
-        self.model = model
-        self.maneuvers = tuple(maneuvers)
+        super().__init__(OutputProblem(model, maneuvers), process)
         self.periods_s = _periods_s([m.dt_s for m in maneuvers])
-        self.process = process
-        self.process_index = [model.states.index(s) for s in process]
-        self.n_model = len(self.output_problem.names)
-        self.names = (
-            *self.output_problem.names,
-            *(f"log_process.{s}" for s in process),
-            *(f"log_noise.{y}" for y in model.outputs),
-        )
-
-    def noise(self, theta: Array) -> tuple[Array, Array]:
-        """Return spectral density of every state's process noise and variance of every output."""
-        split = self.n_model + len(self.process)
-        intensity = np.zeros(len(self.model.states))
-        with np.errstate(over="ignore"):
-            intensity[self.process_index] = np.exp(2.0 * theta[self.n_model : split])
-            return intensity, np.exp(2.0 * theta[split:])
-
-    def columns(self, maneuver: int) -> IntArray:
-        """Return which unknowns the innovations of a maneuver depend on."""
-        noise = np.arange(self.n_model, len(self.names))
-        return np.concatenate([self.output_problem.columns(maneuver), noise])
 
     def sampled(self, maneuver: int, theta: Array) -> SampledModel:
         """Return the model over one sample of a maneuver, its slopes by `columns`."""
@@ -169,61 +78,125 @@ class FilterProblem:
         if not (np.isfinite(intensity).all() and np.isfinite(power).all()):
             return None
         of_period: dict[float, SteadyStateFilter] = {}
-        likelihood = InnovationLikelihood(z=[], e=[], filters=[], intermittent=[], cost=0.0)
-        for number, (maneuver, period_s) in enumerate(
-            zip(self.maneuvers, self.periods_s, strict=True)
-        ):
+        runs: list[Filtered] = []
+        for number, period_s in enumerate(self.periods_s):
             steady = of_period.get(period_s) or steady_state_filter(
                 A, C, intensity, np.diag(power), period_s
             )
             if steady is None:
                 return None
             of_period[period_s] = steady
-            likelihood.filters.append(steady)
-            sampled = self.output_problem.sampled(number, theta, slopes=False)
-            run = self._intermittent if maneuver.held else self._steady
-            if not run(likelihood, sampled, power):
+            model = self.output_problem.sampled(number, theta, slopes=False)
+            equations = FilterEquations.of_known_noise(model, steady.Q, power, steady.P)
+            run = self._filtered(number, equations, steady)
+            if run is None:
                 return None
-        prior = self.output_problem.prior_precision
-        deviation = theta[: self.n_model] - self.output_problem.prior_mean
-        likelihood.cost += 0.5 * float(np.sum(prior * deviation**2))
-        return likelihood if np.isfinite(likelihood.cost) else None
+            runs.append(run)
+        return self.likelihood(theta, runs, [of_period[period_s] for period_s in self.periods_s])
 
-    def _steady(self, likelihood: InnovationLikelihood, model: SampledModel, power: Array) -> bool:
-        """Add the next maneuver by the steady gain of its filter; return whether it is finite."""
-        number, gain = len(likelihood.e), likelihood.filters[-1]
-        measured, drive = self.maneuvers[number].outputs, self.output_problem.drive(number)
-        finite, z = filter_innovations(model, gain.K, drive, measured)
-        if not finite:
-            return False
-        likelihood.z.append(z)
-        likelihood.e.append(z[:, -len(power) :])
-        likelihood.intermittent.append(None)
-        white = likelihood.e[-1] @ gain.whitener.T
-        likelihood.cost += 0.5 * float(np.sum(white**2))
-        likelihood.cost -= len(z) * float(np.sum(np.log(np.diag(gain.whitener))))
-        return True
+    def _filtered(
+        self, number: int, equations: FilterEquations, steady: SteadyStateFilter
+    ) -> Filtered | None:
+        """Run the filter over a maneuver; None if it fails."""
+        maneuver, drive = self.maneuvers[number], self.output_problem.drive(number)
+        if maneuver.held:
+            return filter_intermittent(equations, drive, maneuver)
+        return filter_innovations(equations.model, steady, drive, maneuver.outputs)
 
-    def _intermittent(
-        self, likelihood: InnovationLikelihood, model: SampledModel, power: Array
-    ) -> bool:
-        """Add the next maneuver, outputs missing; return whether the filter did not fail.
+    def slopes(self, theta: Array, point: InnovationLikelihood) -> list[InnovationSlopes]:
+        """Return slopes of every maneuver's innovations.
 
-        It begins as if all outputs had been measured before the first sample.
+        Raises
+        ------
+        IdentificationError
+            If the filter fails with slopes where it did not without.
         """
-        number, steady = len(likelihood.e), likelihood.filters[-1]
-        found = filter_intermittent(
-            FilterEquations.of_known_noise(model, steady.Q, power, steady.P),
-            self.output_problem.drive(number),
-            self.maneuvers[number],
+        n, common = len(self.model.states), self.output_problem.n_common
+        of_period: dict[float, GainSensitivities] = {}
+        found = []
+        for number, period_s in enumerate(self.periods_s):
+            run, steady, model = (
+                point.runs[number],
+                point.filters[number],
+                self.sampled(number, theta),
+            )
+            if period_s not in of_period:
+                of_period[period_s] = gain_sensitivities(
+                    self, theta, steady, period_s, model.by_read[:, :n, :common]
+                )
+            by = of_period[period_s]
+            found.append(
+                self._steady_slopes(number, model, run, by)
+                if isinstance(run, SteadyInnovations)
+                else self._sequential_slopes(number, theta, steady, by)
+            )
+        return found
+
+    def set_steps(self, bounds: Array) -> None:
+        """Do nothing: slopes of a linear model are exact."""
+
+    def _sequential_slopes(
+        self, number: int, theta: Array, steady: SteadyStateFilter, by: GainSensitivities
+    ) -> InnovationSlopes:
+        """Return those of a maneuver with missing outputs, its own constants last: they move its
+        states alone."""
+        outputs, active = self.output_problem, self.columns(number)
+        constants = outputs.n_common + np.arange(outputs.n_local)
+        own = np.concatenate([np.delete(np.arange(len(active)), constants), constants])
+        Q_slopes, P_slopes = (np.ascontiguousarray(x.transpose(1, 2, 0)) for x in (by.Q, by.P))
+        equations = FilterEquations(
+            model=self.sampled(number, theta).by(own),
+            Q=steady.Q,
+            Q_slopes=Q_slopes,
+            variance=self.noise(theta)[1],
+            P=steady.P,
+            P_slopes=P_slopes,
         )
-        if found is None:
-            return False
-        likelihood.z.append(np.zeros((0, 0)))
-        likelihood.e.append(found.e)
-        likelihood.intermittent.append(found)
-        likelihood.cost += found.cost
-        return True
+        run = filter_intermittent(equations, outputs.drive(number), self.maneuvers[number])
+        if run is None:  # it ran at this very point without slopes
+            raise IdentificationError(f"model {self.model.name}: the Kalman filter has no slopes")
+        return run.slopes(active[own])
+
+    def _steady_slopes(
+        self, number: int, model: SampledModel, run: SteadyInnovations, by: GainSensitivities
+    ) -> InnovationSlopes:
+        """Return those of a maneuver that is measured at every sample."""
+        n, p = len(self.model.states), len(self.model.outputs)
+        steady, common = run.steady, self.output_problem.n_common
+        direct = model.by_read.transpose(1, 0, 2)
+        w, width = model.step.shape[1] - n, model.by_start.shape[1]
+        noise = slice(common + self.output_problem.n_local, width)
+        drive = np.zeros((n + w + p, n, width))
+        FK = steady.F @ steady.K
+        drive[: n + w] = model.by_step.transpose(1, 0, 2) - FK @ direct
+        drive[n + w :, :, :common] = np.einsum(
+            "iaq,aj->jiq", model.by_step[:, :n, :common], steady.K
+        )
+        for part, own in ((slice(0, common), slice(0, common)), (noise, slice(common, None))):
+            drive[n + w :, :, part] += np.einsum("ia,qaj->jiq", steady.F, by.K[own])
+        samples = len(run.z)
+        out = np.empty((p, samples, width))
+        F, C, start = steady.F - FK @ model.C, steady.whitener @ model.C, model.by_start
+        propagate(F, drive.transpose(1, 0, 2), run.z, C, start, out)
+        # Direct part at a fixed state; the rest comes through the state.
+        known_state = -(steady.whitener @ direct).reshape(n + w, -1)
+        by_white = (run.z[:, : n + w] @ known_state).reshape(samples, p, width)
+        by_white -= out.transpose(1, 0, 2)
+        # The gain depends only on the unknowns that all maneuvers share.
+        spread = steady.whitener @ by.S @ steady.whitener.T
+        trace, outer = np.trace(spread, axis1=1, axis2=2), run.white.T @ run.white
+        flat = spread.reshape(len(spread), -1)
+        return InnovationSlopes(
+            by_white=by_white,
+            columns=self.columns(number),
+            information=0.5 * samples * (flat @ flat.T),
+            score=-0.5 * (samples * trace - np.sum(spread * outer, axis=(1, 2))),
+            shared=self._shared(),
+        )
+
+    def _shared(self) -> IntArray:
+        common = np.arange(self.output_problem.n_common)
+        return np.concatenate([common, np.arange(self.n_model, len(self.names))])
 
 
 def _periods_s(steps_s: Sequence[float]) -> list[float]:
@@ -233,36 +206,3 @@ def _periods_s(steps_s: Sequence[float]) -> list[float]:
         near = [t for t in found if abs(t - step_s) < SAME_PERIOD * t]
         found.append(near[0] if near else step_s)
     return found
-
-
-def steady_state_filter(
-    A: Array, C: Array, intensity: Array, R: Array, dt_s: float
-) -> SteadyStateFilter | None:
-    """Return the filter with P of the Riccati equation, S = C P C' + R and K = P C' S^-1.
-
-    EQUATIONS.md, eq. 29. None where none exists.
-
-    Parameters
-    ----------
-    A : Array, shape (n, n)
-    C : Array, shape (p, n)
-    intensity : Array, shape (n,)
-        Spectral density of each state's noise, unit of the state squared per second.
-    R : Array, shape (p, p)
-        Covariance of the measurement noise.
-    dt_s : float
-        Sample period, s.
-    """
-    F, Qd = discrete_noise(A, intensity, dt_s)
-    if not np.isfinite(Qd).all() or np.max(np.abs(F)) > 1e6:
-        return None
-    try:
-        solved, P = predicted_covariance(F, C, Qd, R)
-        S = C @ P @ C.T + R
-        factor = np.linalg.cholesky(S)
-        if not solved:
-            return None
-        K = np.ascontiguousarray(np.linalg.solve(S, C @ P).T)
-        return SteadyStateFilter(F, Qd, P, S, np.linalg.inv(factor), K)
-    except np.linalg.LinAlgError:
-        return None

@@ -8,8 +8,9 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.numerics.discretisation import discretise
-from host.sysid.numerics.filter_problem import FilterProblem, SteadyStateFilter
+from host.sysid.numerics.innovation_problem import InnovationProblem
 from host.sysid.numerics.process_noise import halvings_of, van_loan
+from host.sysid.numerics.riccati import SteadyStateFilter
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +25,7 @@ class GainSensitivities:
 
 
 def gain_sensitivities(
-    problem: FilterProblem,
+    problem: InnovationProblem,
     theta: Array,
     gain: SteadyStateFilter,
     dt_s: float,
@@ -64,7 +65,7 @@ def gain_sensitivities(
 
 
 def _noise_sensitivities(
-    problem: FilterProblem, A: Array, intensity: Array, dt_s: float
+    problem: InnovationProblem, A: Array, intensity: Array, dt_s: float
 ) -> tuple[Array, Array]:
     """Return derivatives of F and Q of a sample, each (common and process, n, n)."""
     n, halvings = len(A), halvings_of(A, dt_s)

@@ -15,12 +15,9 @@ from host.arrays import Array
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.discretisation import discretise
-from host.sysid.numerics.filter_problem import (
-    FilterProblem,
-    SteadyStateFilter,
-    steady_state_filter,
-)
+from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.intermittent_filter import FilterEquations, filter_intermittent
+from host.sysid.numerics.riccati import SteadyStateFilter, steady_state_filter
 from host.sysid.numerics.sampled_model import SampledModel
 
 

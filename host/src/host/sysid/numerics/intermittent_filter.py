@@ -11,19 +11,16 @@ them, the noise of each output last; then those of the states alone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from host.arrays import Array, BoolArray
-from host.compiled import compiled, compiled_part, has_compiler
-from host.extras import install_hint
+from host.arrays import Array, BoolArray, IntArray
+from host.compiled import compiled, compiled_part
 from host.sysid.models.maneuver import Maneuver
+from host.sysid.numerics.innovation_problem import InnovationSlopes
 from host.sysid.numerics.recursion import STATE_LIMIT
 from host.sysid.numerics.sampled_model import SampledModel
-
-SAMPLES_WITHOUT_COMPILER = 500  # of a filter that Python runs in minutes
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +56,10 @@ class FilterEquations:
 
 
 @dataclass(frozen=True, slots=True)
-class IntermittentInnovations:
-    """Innovations of one maneuver; of what was not measured they are zero, their variance one.
+class SequentialInnovations:
+    """Innovations of one maneuver, outputs of a sample taken in turn.
+
+    Of what was not measured they are zero, their variance one.
 
     Attributes
     ----------
@@ -81,23 +80,36 @@ class IntermittentInnovations:
     @property
     def white(self) -> Array:
         """Innovations of unit variance, (samples, p)."""
-        return np.asarray(self.independent / np.sqrt(self.variance))
+        return self.whitened(self.independent)
 
     @property
     def cost(self) -> float:
         """Negative log likelihood, up to a constant."""
         return 0.5 * float(np.sum(self.white**2 + np.log(self.variance)))
 
-    @property
-    def information(self) -> Array:
-        """What the innovations say on the unknowns, their variance known, (L, L)."""
-        J = self.by_independent.reshape(-1, self.by_independent.shape[-1])
-        return np.asarray(J.T @ J)
+    def whitened(self, innovations: Array) -> Array:
+        """Return innovations such as `independent` with unit variance."""
+        return np.asarray(innovations / np.sqrt(self.variance))
+
+    def slopes(self, columns: IntArray) -> InnovationSlopes:
+        """Return slopes by these unknowns, those first that the variance depends on, (L,).
+
+        Of an innovation w of variance s, given those before, the information is dw dw / s + ds ds /
+        (2 s^2) (Klein & Morelli, Aircraft System Identification, ch. 6).
+        """
+        spread = self.by_variance.reshape(-1, self.by_variance.shape[2])
+        return InnovationSlopes(
+            by_white=self.by_independent,
+            columns=columns,
+            information=0.5 * spread.T @ spread,
+            score=-0.5 * spread.T @ (1.0 - self.white.ravel() ** 2),
+            shared=columns[: spread.shape[1]],
+        )
 
 
 def filter_intermittent(
     equations: FilterEquations, drive: Array, maneuver: Maneuver
-) -> IntermittentInnovations | None:
+) -> SequentialInnovations | None:
     """Run the filter over one maneuver; None if it fails.
 
     Parameters
@@ -109,7 +121,7 @@ def filter_intermittent(
     """
     q, s, measured = equations, equations.model, maneuver.outputs
     size = measured.shape
-    found = IntermittentInnovations(
+    found = SequentialInnovations(
         e=np.zeros(size),
         independent=np.zeros(size),
         variance=np.ones(size),
@@ -123,16 +135,6 @@ def filter_intermittent(
         found.by_independent, found.by_variance,
     )  # fmt: skip
     return found if done and np.isfinite(found.cost) else None
-
-
-def needs_compiler(maneuvers: Sequence[Maneuver]) -> str:
-    """Return why such a filter takes hours over these maneuvers; empty where it does not."""
-    samples = sum(m.samples for m in maneuvers if m.held)
-    if has_compiler() or samples <= SAMPLES_WITHOUT_COMPILER:
-        return ""
-    return (
-        f"a filter of columns with missing rows takes hours without numba: {install_hint('numba')}"
-    )
 
 
 @compiled_part
