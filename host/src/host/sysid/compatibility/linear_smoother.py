@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from host.arrays import Array
+from host.sysid.numerics.kalman_step import corrected, predicted
 
 
 class Step(NamedTuple):
@@ -34,22 +35,12 @@ def smooth(mean: Array, covariance: Array, steps: Sequence[Step]) -> tuple[Array
     means, spreads = np.empty((count, size)), np.empty((count, size, size))
     x, P = mean, covariance
     for k, step in enumerate(steps):
-        PH = P @ step.H.T
-        S = step.H @ PH
-        S[np.diag_indices_from(S)] += step.sd**2
-        gain = np.linalg.solve(S, PH.T).T
-        x = x + gain @ (step.seen - step.H @ x)
-        P = P - gain @ PH.T
-        P = 0.5 * (P + P.T)
+        x, P, _ = corrected(x, P, step.H, step.seen - step.H @ x, step.sd**2)
         means[k], spreads[k] = x, P
-        x = step.F @ x + step.known
-        P = step.F @ P @ step.F.T
-        P[np.diag_indices(size)] += step.power
+        x, P = step.F @ x + step.known, predicted(P, step.F, step.power)
     for k in range(count - 2, -1, -1):
         step = steps[k]
-        FP = step.F @ spreads[k]
-        ahead = FP @ step.F.T
-        ahead[np.diag_indices(size)] += step.power
+        FP, ahead = step.F @ spreads[k], predicted(spreads[k], step.F, step.power)
         # Constants have no noise of their own: a share of rounding keeps the inverse finite.
         scale = np.sqrt(np.maximum(np.diag(ahead), 1e-30))
         scaled = ahead / scale / scale[:, None] + 1e-10 * np.eye(size)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,8 +13,9 @@ from host.sysid.estimators.start_values import start_values_of
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.discretisation import discretise
+from host.sysid.numerics.kalman_step import corrected, predicted
 from host.sysid.numerics.output_error_problem import check_shapes
+from host.sysid.numerics.sampled_model import Sampler
 
 PASSES = 2  # over the record: the second starts from the parameters of the first
 INITIAL_RELATIVE_SD = 0.5  # first standard deviation of a parameter, relative to its size
@@ -288,58 +289,22 @@ def _bias_variance(model: LinearModel, maneuver: Maneuver, k: int) -> float:
 def _extended_pass(
     filter_: JointFilter, maneuver: Maneuver, joint: Array, P: Array
 ) -> tuple[Array, Array, Array, Array]:
-    model, n = filter_.model, filter_.n_states
-    m, q = len(model.inputs), len(model.parameters)
-    foh = model.hold == "foh"
-    entries, outputs = model.entries("AB"), model.entries("CD")
-    rates = len(model.state_biases)
-    bias_rows = [model.states.index(s) for s in model.state_biases]
-    row = np.concatenate([entries.row, np.array(bias_rows, dtype=np.int64)])
-    column = np.concatenate([entries.column, np.full(rates, n + m, dtype=np.int64)])
-    parameter = np.concatenate([entries.parameter, np.arange(q, q + rates, dtype=np.int64)])
-    gain = np.concatenate([entries.gain, np.ones(rates)])
-    Q = np.zeros_like(P)
-    Q[:n, :n] = np.diag(filter_.process**2) * maneuver.dt_s
+    n, size = filter_.n_states, len(joint)
+    sampler = Sampler(replace(filter_.model, initial_states=()))
+    variance, power = np.diag(filter_.R), np.zeros(size)
+    power[:n] = filter_.process**2 * maneuver.dt_s
     e, white = np.zeros_like(maneuver.outputs), np.zeros_like(maneuver.outputs)
-    increments = np.diff(maneuver.inputs, axis=0, append=maneuver.inputs[-1:])
-    for k in range(maneuver.samples):
-        x, theta, biases = filter_.split(joint)
-        A, B, C, D = model.matrices(theta)
-        u = maneuver.inputs[k]
-        wide = np.concatenate([x, u])
-        H = np.zeros((len(model.outputs), len(joint)))
-        H[:, :n] = C
-        for t in range(len(outputs.row)):
-            place = n + outputs.parameter[t]
-            H[outputs.row[t], place] += outputs.gain[t] * wide[outputs.column[t]]
-        predicted = C @ x + D @ u
-        for b, output in enumerate(model.output_biases):
-            predicted[model.outputs.index(output)] += biases[rates + b]
-            H[model.outputs.index(output), n + q + rates + b] = 1.0
-        e[k] = maneuver.outputs[k] - predicted
-        S = H @ P @ H.T + filter_.R
-        white[k] = np.linalg.solve(np.linalg.cholesky(S), e[k])
-        K = np.linalg.solve(S, H @ P).T
-        joint = joint + K @ e[k]
-        keep = np.eye(len(joint)) - K @ H
-        P = keep @ P @ keep.T + K @ filter_.R @ K.T
-        x, theta, biases = filter_.split(joint)
-        A, B, _, _ = model.matrices(theta)
-        AB = np.zeros((n, n + m + 1))
-        AB[:, :n], AB[:, n : n + m] = A, B
-        for b, place in enumerate(bias_rows):
-            AB[place, -1] = biases[b]
-        step, slopes = discretise(
-            AB, n, m, foh, maneuver.dt_s, row, column, parameter, gain, q + rates
-        )
-        parts = [x, u, [1.0]]
-        if foh:
-            parts.append(increments[k])
-        z = np.concatenate(parts)
-        F = np.eye(len(joint))
-        F[:n, :n] = step[:, :n]
-        F[:n, n : n + q + rates] = np.einsum("ijq,j->iq", slopes, z)
-        joint[:n] = step @ z
-        P = F @ P @ F.T + Q
-        P = 0.5 * (P + P.T)
+    for k, drive in enumerate(sampler.drive(maneuver)):
+        read, by_read = sampler.reading(np.append(joint[n:], 0.0))
+        z = np.concatenate([joint[:n], drive])
+        e[k] = maneuver.outputs[k] - read @ z
+        H = np.hstack([read[:, :n], np.einsum("jcq,c->jq", by_read, z)])
+        joint, P, white[k] = corrected(joint, P, H, e[k], variance)
+        one = sampler.at(np.append(joint[n:], 0.0), maneuver.dt_s)
+        z = np.concatenate([joint[:n], drive])
+        F = np.eye(size)
+        F[:n, :n] = one.step[:, :n]
+        F[:n, n:] = np.einsum("icq,c->iq", one.by_step, z)
+        joint[:n] = one.step @ z
+        P = predicted(P, F, power)
     return joint, P, e, white

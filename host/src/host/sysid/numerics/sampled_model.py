@@ -126,9 +126,9 @@ class Sampler:
             Without, there are slopes by no unknown.
         """
         model = self.model
-        A, B, C, D = model.matrices(local)
-        p, n = C.shape
-        m, count = B.shape[1], self.width if slopes else 0
+        A, B, _, _ = model.matrices(local)
+        n, m = B.shape
+        count = self.width if slopes else 0
         entries = self._entries if slopes else NO_ENTRIES
         step, by_step = discretise(
             np.column_stack([A, B, local[self.rate]]),
@@ -142,16 +142,23 @@ class Sampler:
             entries.gain,
             count,
         )
-        read = np.zeros((p, self._wide))
-        read[:, :n], read[:, n : n + m], read[:, n + m] = C, D, local[self.offset]
+        read, by_read = self.reading(local)
         return SampledModel(
             step=step,
             by_step=by_step,
             read=read,
-            by_read=self._read_slopes(A, B, local) if slopes else np.zeros((p, self._wide, 0)),
+            by_read=by_read[:, :, :count],
             start=self.start(local),
             by_start=self.by_start[:, :count],
         )
+
+    def reading(self, local: Array) -> tuple[Array, Array]:
+        """Return outputs by state and drive at values of the unknowns, and their slopes."""
+        A, B, C, D = self.model.matrices(local)
+        n, m = B.shape
+        read = np.zeros((len(C), self._wide))
+        read[:, :n], read[:, n : n + m], read[:, n + m] = C, D, local[self.offset]
+        return read, self._read_slopes(A, B, local)
 
     def start(self, local: Array) -> Array:
         """Return the state of the first sample, (n,)."""
