@@ -241,6 +241,39 @@ def test_a_card_half_written_is_none(card: bytes) -> None:
         console(logger).read()
 
 
+AXIS_CARD = card_bytes(
+    HEAD,
+    [DOUBLET, MULTISINE],
+    [({"axis": 0, "told": 1, "harmonic_count": 2, "harmonics": [1, 2, *[0] * 8]}, {})],
+    [1, 0],
+)
+
+
+def test_a_card_with_a_good_hash_and_an_axis_that_is_none_is_refused() -> None:
+    """They were an IndexError: a row that learns axis 2 of 1, and an axis 3."""
+    learning, axis = 96 + dtype("card_learning").fields["axis_of_row"][1], 48 * 5  # type: ignore[index]
+    for place, value, says in (
+        (learning, 2, "row 1: learns axis 2, expected 0 to 1"),
+        (axis + dtype("card_axis").fields["axis"][1], 3, "learned axis 1: axis 3"),  # type: ignore[index]
+    ):
+        assert says in "; ".join(card_faults(sealed(AXIS_CARD, place, value)))
+
+
+def test_no_byte_behind_a_good_hash_is_a_mistake_of_ours() -> None:
+    rng = random.Random(46)
+    for _ in range(3000):
+        place = rng.randrange(len(AXIS_CARD))
+        data = sealed(AXIS_CARD, place, rng.randrange(256))
+        if not card_faults(data):
+            card_lines(read_card(data))
+
+
+def sealed(card: bytes, place: int, value: int) -> bytes:
+    """Return a card with one byte changed and the hash of what it then is."""
+    data = card[:place] + bytes([value]) + card[place + 1 :]
+    return data[:92] + zlib.crc32(data[:92] + data[96:]).to_bytes(4, "little") + data[96:]
+
+
 def test_the_verb_checks_a_file_without_any_port(
     card: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -402,6 +402,7 @@ async def _page(
 
         from host.live.page_guard import PageGuard
         from host.live.page_server import PageServer
+        from host.live.request_noise import quieten
     except ImportError as error:
         raise UsageError(
             f"the page needs {error.name}: {install_hint(error.name)}; or --no-page"
@@ -411,6 +412,7 @@ async def _page(
     guard = PageGuard(port, tuple(own_addresses()) if request.lan else ())
     server = PageServer(session, guard)
     watch.say = server.recording
+    quieten(tell)
     runner = web.AppRunner(server.application(), access_log=None)
     await runner.setup()
     await web.SockSite(runner, listener, backlog=256).start()

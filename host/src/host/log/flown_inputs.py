@@ -62,14 +62,14 @@ def flown_inputs(log: FlightLog) -> list[FlownInput]:
 def inputs_of_session(session: Session) -> list[FlownInput]:
     """Return the inputs of one session, as `flown_inputs` does of all."""
     schema = session.store.schema
-    if "event" not in schema.by_name or "input_start" not in schema.enums.get("event", {}):
+    codes = schema.enums.get("event", {})
+    if not {"input_start", "input_end"} <= set(codes):
         return []
     events, t_us = session.slow("event")
-    codes = schema.enums["event"]
     begins, ends = codes["input_start"], codes["input_end"]
     rows = _rows(session)
-    reasons = {value: name for name, value in schema.enums["input_end"].items()}
-    shapes = {value: name for name, value in schema.enums["card_shape"].items()}
+    reasons = {value: name for name, value in schema.enums.get("input_end", {}).items()}
+    shapes = {value: name for name, value in schema.enums.get("card_shape", {}).items()}
     found: list[FlownInput] = []
     begun: tuple[int, float] | None = None
 
@@ -103,6 +103,8 @@ def inputs_of_session(session: Session) -> list[FlownInput]:
 
 def _rows(session: Session) -> dict[int, dict[str, Any]]:
     """Return the card's rows that the session recorded, by number."""
+    if "card" not in session.store.schema.by_name:
+        return {}
     frames, _ = session.slow("card")
     heads = number("card_head_parts")
     return {

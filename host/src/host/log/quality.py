@@ -146,11 +146,11 @@ class _JumpWatch:
                 for kind in ("servo", "rc")
             )
             for at_s in servo_jumps(t_s, servo, stick, drives & (servo > 0.0)).tolist():
-                own = self.found.setdefault(name, [])
+                own = self.found.get(name, [])
                 if own and at_s <= own[-1]:
                     continue  # seen with the piece before
                 if not any(i.start_s - LONGEST_S <= at_s <= i.end_s for i in self._inputs):
-                    own.append(at_s)
+                    self.found[name] = [*own, at_s]
         keep = int(np.searchsorted(t_s, t_s[-1] - _KEPT_S))
         self._before = t_us[keep:], data[keep:]
 

@@ -63,6 +63,7 @@ ALIASES = {
     "kpa": "kPa", "mb": "mbar", "lb/ft2": "psf", "inhg": "inHg", "%": "percent",
     "sec": "s", "seconds": "s", "msec": "ms", "usec": "us", "µs": "us", "μs": "us",
 }  # fmt: skip
+LONGEST_MESSAGE = 200  # characters of what is said about a map
 KEYS = {"from", "minus", "unit", "sign", "scale", "offset", "commanded"}
 HEADS = {"columns", "about", "base"}
 COMMANDABLE = tuple(f"{surface}_rad" for surface in SURFACES)
@@ -103,6 +104,14 @@ def read_map(path: Path, known: Sequence[str]) -> dict[str, Line]:
     IdentificationError
         If it cannot be read or says what nobody understands.
     """
+    try:
+        return _read_map(path, known)
+    except IdentificationError as error:  # it repeats a stranger's words
+        text, most = str(error), LONGEST_MESSAGE
+        raise IdentificationError(text if len(text) <= most else f"{text[: most - 3]}...") from None
+
+
+def _read_map(path: Path, known: Sequence[str]) -> dict[str, Line]:
     shipped = is_shipped(path)
     path = map_file(path)
     document = read_toml(path, IdentificationError)

@@ -12,9 +12,10 @@ import numpy as np
 
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.extras import install_hint
 from host.physical.calibration import Calibration
 from host.physical.recording import Recording
+from host.readers.expanded_size import ask_expanded_size
+from host.readers.parquet_table import read_parquet
 from host.readers.text_table import HEAD_BYTES, read_text
 
 if TYPE_CHECKING:
@@ -75,7 +76,7 @@ def read_foreign(source: Path) -> Foreign:
     if kind == ".mat":
         return _mat(source, head)
     if kind == ".parquet":
-        return from_frame(_parquet(source))
+        return from_frame(read_parquet(source))
     text = read_text(source, head)
     found = from_frame(text.frame)
     found.notes, found.twice = text.notes, text.twice
@@ -102,21 +103,6 @@ def is_text(source: Path) -> bool:
     with source.open("rb") as file:
         head = file.read(HEAD_BYTES)
     return b"\0" not in head and head.count(b"\n") + head.count(b"\r") > 1
-
-
-def _parquet(source: Path) -> pd.DataFrame:
-    import pandas as pd
-
-    try:
-        frame = pd.read_parquet(source)
-    except ImportError as error:
-        raise IdentificationError(
-            f"{source}: Parquet needs pyarrow: {install_hint('pyarrow')}"
-        ) from error
-    except (ValueError, OSError) as error:
-        raise IdentificationError(f"{source}: not a Parquet file: {error}") from error
-    # Of an index without a name pandas makes a column `index`; one that only counts is none.
-    return frame if isinstance(frame.index, pd.RangeIndex) else frame.reset_index()
 
 
 def from_frame(frame: pd.DataFrame) -> Foreign:
@@ -186,6 +172,7 @@ def _mat(source: Path, head: bytes) -> Foreign:
             f"{source}: a MAT file of version 7.3 (HDF5); in MATLAB: s = load('{source.name}');"
             " save('as7.mat', '-struct', 's', '-v7')"
         )
+    ask_expanded_size(source)
     try:
         content = io.loadmat(source, squeeze_me=True, struct_as_record=True)
     except Exception as error:  # scipy names no common ancestor of what damaged files raise

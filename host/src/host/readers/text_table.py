@@ -81,6 +81,7 @@ def read_text(source: Path, head: bytes) -> Text:
                 skipinitialspace=True,
                 index_col=False,
                 low_memory=False,
+                compression=None,  # whatever the ending says: what it expands to nobody asked
             )
         except UnicodeDecodeError:
             continue

@@ -79,6 +79,7 @@ def act(args: argparse.Namespace, console: CardConsole, data: bytes | None) -> i
     """Write, read, compare or erase; return an exit code."""
     from host.progress import draw_share
     from host.terminal import bar
+    from host.wire.flight_card import card_faults
 
     if args.do == "erase":
         console.must("erase")
@@ -96,6 +97,8 @@ def act(args: argparse.Namespace, console: CardConsole, data: bytes | None) -> i
         same = kept == data
         print("the logger has this card" if same else "the logger has another card")
         return int(ExitCode.OK if same else ExitCode.CHECK)
+    if wrong := card_faults(kept):
+        raise UsageError(f"the logger's card is none: {wrong[0]}; write it again")
     if args.file is not None:
         from host.sysid.answer import atomic_write
 

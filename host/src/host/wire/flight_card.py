@@ -137,14 +137,20 @@ def parts(data: bytes) -> list[bytes]:
 
 
 def read_card(data: bytes) -> CardFile:
-    """Return a card in numbers; ask `card_faults` first."""
-    heads = number("card_head_parts")
-    head, each = _numbers(HEAD, data), parts(data)
+    """Return a card in numbers; ask `card_faults` first: a bad one names what is not there."""
+    head, rows = _head_and_rows(data)
+    heads, each = number("card_head_parts"), parts(data)
     behind = heads + head["rows"]
-    rows = [_numbers(ROW, part) for part in each[heads:behind]]
     learned = [_numbers(AXIS, part)["axis"] for part in each[behind :: number("card_axis_parts")]]
     axes = _numbers(LEARNING, each[heads - 1])["axis_of_row"][: len(rows)]
     return CardFile(head, tuple(rows), tuple(TURNS[learned[n - 1]] if n else "" for n in axes))
+
+
+def _head_and_rows(data: bytes) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Return a card's numbers that mean something by themselves."""
+    head, heads = _numbers(HEAD, data), number("card_head_parts")
+    rows = parts(data)[heads : heads + head["rows"]]
+    return head, [_numbers(ROW, part) for part in rows]
 
 
 def body_parts(head: bytes) -> int:
@@ -183,8 +189,7 @@ def card_faults(data: bytes) -> list[str]:
     if not 1 <= rows <= most:
         return [f"{found} parts behind the head and {found - rows} of them of learned axes"]
     always = _table()["layouts"][HEAD]["always"]
-    card = read_card(data)
-    head = card.head
+    head, each = _head_and_rows(data)
     wrong = [
         f"{k} is {head[k]}, expected {v}"
         for k, v in always.items()
@@ -197,7 +202,7 @@ def card_faults(data: bytes) -> list[str]:
     if head["crc"] != check or check == 0:
         wrong.append(f"CRC-32 is {head['crc']:08x}, expected {check:08x}: a byte was changed")
     wrong += [*_limit_faults(head), *_learning_faults(data, rows, head["learned_axes"])]
-    return [*wrong, *(x for k, row in enumerate(card.rows)
+    return [*wrong, *(x for k, row in enumerate(each)
             for x in _row_faults(k + 1, row, head, data[(heads + k) * size :][:size]))]  # fmt: skip
 
 

@@ -37,7 +37,10 @@ READ_FIELDS: dict[str, dict[str, str]] = {
     "baro_coefficients": {"sensor": "u8"},
 }
 # Frames that came later: read where a log has them.
-READ_IF_THERE = {"file": {"preallocated": "u32"}}
+READ_IF_THERE = {
+    "file": {"preallocated": "u32"},
+    "card": {"part": "u8", "bytes": "u8[48]"},
+}
 READ_WORDS: dict[str, tuple[str, ...]] = {
     "gps_fix": ("fix_2d", "fix_3d"),
     "event": ("session_end", "block_skipped"),
