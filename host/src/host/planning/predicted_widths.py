@@ -22,10 +22,10 @@ from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.readers.even_grid import even_arrays
 from host.readers.foreign_tables import from_frame
 from host.readers.recorded import recording_of_table
-from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.coefficients import CoefficientFit
 from host.sysid.coefficients.coefficient_intervals import CoefficientIntervals
 from host.sysid.flight.linear_answer import Answer
+from host.sysid.models.parameter_units import parameter_unit
 from host.sysid.pipeline import identify
 from host.twin.testcard.cards import Card
 from host.twin.virtual import virtual_flight

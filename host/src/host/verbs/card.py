@@ -100,7 +100,7 @@ def act(args: argparse.Namespace, console: CardConsole, data: bytes | None) -> i
     if wrong := card_faults(kept):
         raise UsageError(f"the logger's card is none: {wrong[0]}; write it again")
     if args.file is not None:
-        from host.sysid.answer import atomic_write
+        from host.export.atomic_files import atomic_write
 
         with atomic_write(args.file) as part:
             part.write_bytes(kept)

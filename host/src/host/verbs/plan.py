@@ -182,7 +182,7 @@ def run(args: argparse.Namespace) -> int:
 def _check(args: argparse.Namespace) -> None:
     """Refuse wrong arguments before anything is designed or flown."""
     from host.aircraft.aircraft_ranges import AIRSPEED
-    from host.sysid.answer.atomic_files import check_destination
+    from host.export.atomic_files import check_destination
 
     if args.airspeed is not None:
         AIRSPEED.check("--airspeed", args.airspeed, UsageError)
@@ -247,10 +247,10 @@ def _optimal(args: argparse.Namespace) -> Card:
 def _write_logger_card(card: Card, args: argparse.Namespace) -> None:
     """Write the file that `host card write` puts into the logger."""
     from host.aircraft.linear_aircraft import load
+    from host.export.atomic_files import atomic_write
     from host.physical.calibration import load_calibration
     from host.planning.learning_card import learned_axes
     from host.planning.logger_card import Envelope, logger_card
-    from host.sysid.answer import atomic_write
     from host.wire.card_text import card_lines
     from host.wire.flight_card import read_card
 
@@ -272,7 +272,7 @@ def _write_logger_card(card: Card, args: argparse.Namespace) -> None:
 
 
 def _save(path: Path, text: str) -> None:
-    from host.sysid.answer import atomic_write
+    from host.export.atomic_files import atomic_write
 
     with atomic_write(path) as part:
         part.write_text(text, encoding="utf-8")

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from host.cli import main
 from host.errors import IdentificationError
-from host.sysid.answer import OutputPaths, atomic_write, check_outputs
-from host.sysid.answer.mat_file import labels, mat_name, write_mat
-from host.sysid.answer.simulators.forms import write_form
+from host.export.atomic_files import atomic_write
+from host.export.mat_writer import mat_name
+from host.sysid.answer import OutputPaths, check_outputs
+from host.sysid.answer.mat_file import labels, write_answers
+from host.sysid.answer.simulator_forms import write_form
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.linear_answer import Answer
 from scipy import io
@@ -184,7 +186,7 @@ def test_a_mat_file_holds_what_is_printed_and_the_histories(
     tmp_path: Path, answers: list[Answer]
 ) -> None:
     path = tmp_path / "a.mat"
-    write_mat(path, answers, None)
+    write_answers(path, answers, None)
     loaded = io.loadmat(path, simplify_cells=True)["short_period"]
     answer = answers[0]
     result = answer.result

@@ -25,7 +25,7 @@ from host.errors import IdentificationError
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.answer import OutputPaths, check_outputs
 from host.sysid.answer.aircraft_export import save_aircraft
-from host.sysid.answer.simulators.forms import write_form
+from host.sysid.answer.simulator_forms import write_form
 
 from tests.host.sysid.answer.jsbsim_air import JSBSIM_AIR
 

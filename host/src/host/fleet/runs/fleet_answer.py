@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from host.export.atomic_files import atomic_write, file_names
 from host.fleet.dataset.row_flights import reference_cg, type_flights
 from host.fleet.flight_task import IDENTIFIED
 from host.fleet.pages.aircraft_changes import AircraftHistory, change_lines, histories
@@ -14,8 +15,6 @@ from host.fleet.pages.fleet_page import fleet_page
 from host.fleet.pages.type_prior import type_prior
 from host.fleet.pages.type_text import type_document, type_lines
 from host.fleet.statistics.type_model import TypeModel, type_model
-from host.sysid.answer import atomic_write
-from host.sysid.answer.atomic_files import file_names
 
 if TYPE_CHECKING:
     import pandas as pd

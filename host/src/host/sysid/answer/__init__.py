@@ -7,7 +7,6 @@ from host.faces import lazily
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from host.sysid.answer.atomic_files import atomic_write
     from host.sysid.answer.json_document import answer_document, json_text
     from host.sysid.answer.marks import CAREFUL, MARKS, TRUSTED
     from host.sysid.answer.output_files import OutputPaths, check_outputs
@@ -20,7 +19,6 @@ __all__ = [
     "TRUSTED",
     "OutputPaths",
     "answer_document",
-    "atomic_write",
     "check_outputs",
     "json_text",
     "read_truth",
@@ -37,7 +35,6 @@ __getattr__ = lazily(
         "OutputPaths": "output_files",
         "TRUSTED": "marks",
         "answer_document": "json_document",
-        "atomic_write": "atomic_files",
         "check_outputs": "output_files",
         "json_text": "json_document",
         "read_truth": "truth_comparison",

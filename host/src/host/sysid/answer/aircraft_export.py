@@ -20,8 +20,8 @@ import numpy as np
 from host.aircraft.file import Aircraft
 from host.arrays import Array
 from host.errors import IdentificationError
+from host.export.atomic_files import atomic_write
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
-from host.sysid.answer.atomic_files import atomic_write
 from host.sysid.coefficients.coefficient_fit import MeanCondition
 
 # Names of the aircraft file for the names of the answer.

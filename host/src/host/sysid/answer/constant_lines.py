@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from host.people_units import people_name
-from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.models.model_constants import known_constants
+from host.sysid.models.parameter_units import parameter_unit
 
 IN_A_LINE = 4  # maneuvers
 # Half-width over value from which a constant only trades with another: without the bank angle the

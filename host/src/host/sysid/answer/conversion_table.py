@@ -31,8 +31,8 @@ from host.sysid.aerodynamics.derivative_conversion import (
     to_coefficients,
     to_derivatives,
 )
-from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.models.model_file import read_model, read_trim
+from host.sysid.models.parameter_units import parameter_unit
 from host.sysid.models.templates import Trim, template
 from host.sysid.models.toml_document import read_document
 

@@ -12,8 +12,8 @@ import numpy as np
 from host.arrays import Array
 from host.constants import DEG_PER_RAD
 from host.errors import IdentificationError
+from host.export.atomic_files import atomic_write
 from host.extras import install_hint
-from host.sysid.answer.atomic_files import atomic_write
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,7 +11,6 @@ import numpy as np
 
 from host.sysid.answer.converted_marks import converted_marks
 from host.sysid.answer.marks import Verdict
-from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.servo_lines import servo_document
 from host.sysid.answer.settling_history import settling_document
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, unpredicted_states
@@ -23,6 +22,7 @@ from host.sysid.flight.maneuver_detection import DetectedManeuver, Grade
 from host.sysid.flight.reconstructed_flight import maneuver_name
 from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.model_constants import known_constants
+from host.sysid.models.parameter_units import parameter_unit
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer

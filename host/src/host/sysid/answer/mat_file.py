@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.answer.atomic_files import atomic_write
-from host.sysid.answer.parameter_units import parameter_unit
+from host.export.mat_writer import cells, mat_name, write_mat
 from host.sysid.compatibility.inverse_sensor_model import FIT_RATE_HZ
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.models.modal_analysis import Mode
+from host.sysid.models.parameter_units import parameter_unit
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 
-LONGEST = 31  # characters of a name in a MAT file that every reader takes
 
-
-def write_mat(path: Path, answers: Sequence[Answer], direct: CoefficientAnswer | None) -> None:
+def write_answers(path: Path, answers: Sequence[Answer], direct: CoefficientAnswer | None) -> None:
     """Write the answers, a structure each: matrices, estimates, covariance, modes, histories.
 
     Parameters
@@ -34,8 +31,6 @@ def write_mat(path: Path, answers: Sequence[Answer], direct: CoefficientAnswer |
     direct : CoefficientAnswer or None
         Becomes `coefficients` and its linear motion `coefficients_longitudinal`, `_lateral`.
     """
-    from scipy import io
-
     content: dict[str, Any] = {}
     for answer, label in zip(answers, labels(answers), strict=True):
         content[mat_name(label, content)] = _linear(answer)
@@ -47,11 +42,10 @@ def write_mat(path: Path, answers: Sequence[Answer], direct: CoefficientAnswer |
                 "B": system.B,
                 "A_half_width": system.A_half,
                 "B_half_width": system.B_half,
-                "states": _cells(system.states),
-                "inputs": _cells(system.inputs),
+                "states": cells(system.states),
+                "inputs": cells(system.inputs),
             }
-    with atomic_write(path) as part:
-        io.savemat(str(part), content, appendmat=False)
+    write_mat(path, content)
 
 
 def labels(answers: Sequence[Answer]) -> list[str]:
@@ -67,17 +61,6 @@ def labels(answers: Sequence[Answer]) -> list[str]:
     return found
 
 
-def mat_name(label: str, taken: Iterable[str]) -> str:
-    """Return a label as MATLAB takes it for a variable, other than those taken."""
-    plain = re.sub(r"\W", "_", label, flags=re.ASCII)
-    plain = plain if re.match(r"[A-Za-z]", plain) else f"model_{plain}"
-    name, number = plain[:LONGEST], 1
-    while name in taken:
-        number += 1
-        name = f"{plain[: LONGEST - len(str(number)) - 1]}_{number}"
-    return name
-
-
 def _linear(answer: Answer) -> dict[str, Any]:
     A, B, C, D = answer.result.matrices()
     result = answer.result
@@ -86,25 +69,25 @@ def _linear(answer: Answer) -> dict[str, Any]:
         "B": B,
         "C": C,
         "D": D,
-        "names": _cells(result.names),
-        "units": _cells(parameter_unit(answer.model, name) for name in result.names),
+        "names": cells(result.names),
+        "units": cells(parameter_unit(answer.model, name) for name in result.names),
         "estimate": result.estimate,
         "covariance": result.covariance,
         "half_width": result.half_width(),
-        "states": _cells(answer.model.states),
-        "inputs": _cells(answer.model.inputs),
-        "outputs": _cells(answer.model.outputs),
+        "states": cells(answer.model.states),
+        "inputs": cells(answer.model.inputs),
+        "outputs": cells(answer.model.outputs),
         "method": answer.method,
         "airspeed_mps": answer.condition.airspeed_mps,
         "qbar_pa": answer.condition.qbar_pa,
         "alpha_rad": answer.trim.alpha_rad,
         "theta_rad": answer.trim.theta_rad,
-        "refused": _cells(r.name for r in answer.identifiability_flags),
+        "refused": cells(r.name for r in answer.identifiability_flags),
         "delays": _pairs(answer.delays),
         "coefficients": _pairs({c.name: (c.value, c.half_width) for c in answer.coefficients}),
         "modes": _modes(answer.modes),
         "residual_kind": result.residual_kind,
-        "maneuvers": _cells(
+        "maneuvers": cells(
             {
                 "name": maneuver.name,
                 "t_s": maneuver.time_s,
@@ -124,7 +107,7 @@ def _coefficients(answer: CoefficientAnswer) -> dict[str, Any]:
     found, flight = answer.fit.derivatives, answer.fit.condition
     traces = answer.fit.histories
     return {
-        "names": _cells(d.name for d in found),
+        "names": cells(d.name for d in found),
         "estimate": np.array([d.value for d in found]),
         "half_width": np.array([d.half_width for d in found]),
         "flagged": np.array([d.flagged for d in found]),
@@ -148,24 +131,15 @@ def _coefficients(answer: CoefficientAnswer) -> dict[str, Any]:
 def _pairs(values: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
     """Return a table of values with their 95 % half-widths."""
     table: Array = np.array(list(values.values()), dtype=np.float64).reshape(-1, 2)
-    return {"names": _cells(values), "value": table[:, 0], "half_width": table[:, 1]}
+    return {"names": cells(values), "value": table[:, 0], "half_width": table[:, 1]}
 
 
 def _modes(modes: Sequence[Mode]) -> dict[str, Any]:
     return {
-        "names": _cells(m.name for m in modes),
+        "names": cells(m.name for m in modes),
         "eigenvalue": np.array([m.eigenvalue for m in modes]),
         "frequency_radps": np.array([m.frequency_radps for m in modes]),
         "frequency_half_width_radps": np.array([m.frequency_half_width_radps for m in modes]),
         "damping": np.array([m.damping for m in modes]),
         "damping_half_width": np.array([m.damping_half_width for m in modes]),
     }
-
-
-def _cells(values: Iterable[Any]) -> Any:
-    """Return a cell array, a column even of equal lengths."""
-    listed = list(values)
-    cells = np.empty(len(listed), dtype=object)
-    for k, value in enumerate(listed):
-        cells[k] = value
-    return cells

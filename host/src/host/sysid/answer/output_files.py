@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 from host.arrays import Array
 from host.errors import IdentificationError
+from host.export.atomic_files import atomic_write, check_destination, file_names
 from host.extras import install_hint
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
-from host.sysid.answer.atomic_files import atomic_write, check_destination, file_names
-from host.sysid.answer.mat_file import labels, write_mat
+from host.sysid.answer.mat_file import labels, write_answers
 from host.sysid.answer.settling_history import has_history, write_history
-from host.sysid.answer.simulators.forms import CONTROL, FORMS, files_of, form_of, write_form
+from host.sysid.answer.simulator_forms import CONTROL, FORMS, files_of, form_of, write_form
 from host.sysid.estimators.method_registry import all_methods
 from host.sysid.flight.linear_answer import Answer
 
@@ -146,7 +146,7 @@ def write_outputs(
     """
     written: list[Path] = []
     if places.mat is not None:
-        write_mat(places.mat, answers, direct)
+        write_answers(places.mat, answers, direct)
         written.append(places.mat)
     tables = list(direct.tables) if direct else [a.table for a in answers]
     for path in (places.save_aircraft, places.save_model):
@@ -161,7 +161,7 @@ def write_outputs(
         if not plain or path.suffix.lower() == ".xml":
             written.append(_write_aircraft(path, tables, places.source, direct))
     if places.save_model is not None and places.save_model.suffix.lower() == ".mat":
-        write_mat(places.save_model, answers, direct)
+        write_answers(places.save_model, answers, direct)
         written.append(places.save_model)
     elif places.save_model is not None and places.save_model.suffix.lower() == ".toml":
         written += _write_models(places.save_model, answers, (*places.given, *written))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from host.sysid.answer.atomic_files import atomic_write
+from host.export.atomic_files import atomic_write
 from host.sysid.estimators.estimation_method import loaded
 from host.sysid.estimators.method_registry import find_method
 from host.sysid.estimators.settling import STEPS, settling_of

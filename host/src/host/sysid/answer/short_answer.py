@@ -10,12 +10,12 @@ from host.constants import DEG_PER_RAD
 from host.sysid.answer.converted_marks import converted_marks
 from host.sysid.answer.estimate_lines import mode_lines
 from host.sysid.answer.marks import FAIR, SMALL, share_text
-from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.trust_rules import Evidence
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.coefficients.coefficient_fit import FLAG_SHARE
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.models.diagnostics import reference_values
+from host.sysid.models.parameter_units import parameter_unit
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from host.sysid.answer.converted_marks import converted_marks
 from host.sysid.answer.mat_file import labels
-from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.models.diagnostics import reference_values
 from host.sysid.models.modal_analysis import Mode
+from host.sysid.models.parameter_units import parameter_unit
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from host.sysid.answer.simulators.straight_coefficients import StraightCoefficients
+from host.export.simulators.straight_coefficients import StraightCoefficients
 
 BLEND_PERRAD = 100.0
 LIMITS = (

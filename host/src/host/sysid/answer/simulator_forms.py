@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from host.aircraft.straight_lines import straight_coefficients
 from host.errors import IdentificationError
+from host.export.atomic_files import atomic_write
+from host.export.simulators.aerosandbox_snippet import aerosandbox_text
+from host.export.simulators.ardupilot_sitl import ardupilot_text
+from host.export.simulators.avl_table import avl_text
+from host.export.simulators.flightgear import set_text, with_controls
+from host.export.simulators.gazebo import gazebo_text
+from host.export.simulators.python_control import StateSpace, control_text
+from host.export.simulators.straight_coefficients import SURFACES, StraightCoefficients
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.aircraft_export import identified_aircraft
-from host.sysid.answer.atomic_files import atomic_write
-from host.sysid.answer.simulators.aerosandbox_snippet import aerosandbox_text
-from host.sysid.answer.simulators.ardupilot_sitl import ardupilot_text
-from host.sysid.answer.simulators.avl_table import avl_text
-from host.sysid.answer.simulators.flightgear import set_text, with_controls
-from host.sysid.answer.simulators.gazebo import gazebo_text
-from host.sysid.answer.simulators.python_control import control_text
-from host.sysid.answer.simulators.straight_coefficients import (
-    StraightCoefficients,
-    straight_coefficients,
-)
 from host.sysid.coefficients.coefficient_fit import MeanCondition
 from host.sysid.flight.linear_answer import Answer
 
@@ -77,7 +75,7 @@ def write_form(
             raise IdentificationError(
                 f"{path}: python-control takes linear models; give one (longitudinal, lateral)"
             )
-        return _written({path: control_text(answers)})
+        return _written({path: control_text([_state_space(answer) for answer in answers])})
     if not source:
         raise IdentificationError(
             f"{path}: an aircraft needs mass and geometry; give argument aircraft"
@@ -85,11 +83,35 @@ def write_form(
     made = identified_aircraft(tables, source, condition)
     if form == FLIGHTGEAR:
         name = path.name[: -len(FLIGHTGEAR)]
-        texts = (set_text(name, made.loaded), with_controls(made.jsbsim_xml(), made.loaded))
+        flown = made.loaded
+        limit_rad = {s: flown.scalar(f"surfaces.{s}_limit_rad") for s in SURFACES}
+        texts = (
+            set_text(name, flown.title, flown.scalar("trim.airspeed_mps")),
+            with_controls(made.jsbsim_xml(), limit_rad),
+        )
         return _written(dict(zip(files_of(path), texts, strict=True)))
     alpha_rad = tables[0].alpha_rad
     return _written(
         {path: STRAIGHT[form](straight_coefficients(made.loaded, alpha_rad, made.identified))}
+    )
+
+
+def _state_space(answer: Answer) -> StateSpace:
+    """Return a linear answer as the plain values that a form holds."""
+    model, result = answer.model, answer.result
+    common = len(model.parameters)
+    names = [p.name for p in model.parameters]
+    values, halves = result.estimate[:common].tolist(), result.half_width()[:common].tolist()
+    return StateSpace(
+        answer.template,
+        answer.method,
+        answer.trim.airspeed_mps,
+        list(zip(names, values, halves, strict=True)),
+        tuple(d.name for d in model.delays),
+        tuple(model.matrices(result.estimate)),
+        model.states,
+        model.inputs,
+        model.outputs,
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from host.sysid.answer.simulators.straight_coefficients import (
+from host.export.simulators.straight_coefficients import (
     INPUTS,
     SURFACES,
     StraightCoefficients,

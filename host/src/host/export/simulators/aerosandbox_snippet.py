@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from host.sysid.answer.simulators.straight_coefficients import StraightCoefficients
+from host.export.simulators.straight_coefficients import StraightCoefficients
 
 LIMITS = (
     "For AeroSandbox 4: `aerodynamics(op_point, de, da, dr)` takes an asb.OperatingPoint (alpha and"

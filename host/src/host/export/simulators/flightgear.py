@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from xml.etree import ElementTree
-
-from host.aircraft.file import Aircraft
 
 KNOTS = 3600.0 / 1852.0
 FEET = 1.0 / 0.3048
@@ -24,16 +23,22 @@ LIMITS = (
 )
 
 
-def with_controls(xml: str, aircraft: Aircraft) -> str:
-    """Return JSBSim's XML of an aircraft with surfaces and throttle driven by FlightGear's."""
+def with_controls(xml: str, limit_rad: Mapping[str, float]) -> str:
+    """Return JSBSim's XML of an aircraft with surfaces and throttle driven by FlightGear's.
+
+    Parameters
+    ----------
+    xml : str
+    limit_rad : mapping of str to float
+        Full travel of elevator, aileron and rudder, rad.
+    """
     root = ElementTree.fromstring(xml)
     about = root.find("fileheader/description")
     if about is not None:
         about.text = "\n".join([about.text or "", *LIMITS])
     channel = ElementTree.Element("channel", name="sticks")
     for surface, command, position, sign in CONTROLS:
-        limit = aircraft.scalar(f"surfaces.{surface}_limit_rad")
-        _gain(channel, f"{surface}-travel", command, position, sign * limit)
+        _gain(channel, f"{surface}-travel", command, position, sign * limit_rad[surface])
     _gain(channel, "throttle-travel", THROTTLE, "fcs/throttle-shaft", 1.0)
     rotor = next(part for part in root if part.tag == "flight_control")
     first = next(k for k, part in enumerate(rotor) if part.tag == "channel")
@@ -45,17 +50,17 @@ def with_controls(xml: str, aircraft: Aircraft) -> str:
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
 
 
-def set_text(name: str, aircraft: Aircraft) -> str:
-    """Return FlightGear's ``NAME-set.xml``."""
+def set_text(name: str, title: str, airspeed_mps: float) -> str:
+    """Return FlightGear's ``NAME-set.xml`` of an aircraft that starts at an airspeed."""
     root = ElementTree.Element("PropertyList")
     sim = ElementTree.SubElement(root, "sim")
     presets = ElementTree.SubElement(sim, "presets")
     for parent, tag, text in (
-        (sim, "description", aircraft.title), (sim, "author", "host identify"),
+        (sim, "description", title), (sim, "author", "host identify"),
         (sim, "flight-model", "jsb"), (sim, "aero", name),
         (presets, "onground", "false"),
         (presets, "altitude-ft", f"{100.0 * FEET:.0f}"),
-        (presets, "airspeed-kt", f"{aircraft.scalar('trim.airspeed_mps') * KNOTS:.1f}"),
+        (presets, "airspeed-kt", f"{airspeed_mps * KNOTS:.1f}"),
     ):  # fmt: skip
         ElementTree.SubElement(parent, tag).text = text
     ElementTree.indent(root)
