@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.cli import main
-from host.sysid.aerodynamics.derivative_conversion import ConversionPoint, to_derivatives
 from host.sysid.answer import read_truth, true_coefficients
 from host.sysid.answer.figure_kinds import Bar, interval_bars, save
 from host.sysid.coefficients import CoefficientAnswer
 from host.sysid.coefficients.coefficient_estimator import merged_windows
 from host.sysid.coefficients.coefficient_modes import coefficient_modes, quantities
+from host.sysid.conversion.derivative_conversion import ConversionPoint, to_derivatives
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.pipeline import Identification, identify

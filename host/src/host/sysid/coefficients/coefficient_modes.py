@@ -17,8 +17,8 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2, NORMAL_95
-from host.sysid.aerodynamics.derivative_conversion import Quantities
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
+from host.sysid.conversion.derivative_conversion import Quantities
 from host.sysid.models.modal_analysis import Mode, eigenmodes, lateral_names, longitudinal_names
 
 SIGNALS = {

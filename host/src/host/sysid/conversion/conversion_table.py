@@ -2,7 +2,7 @@
 
 What is read is a model that `host identify --save-model` wrote, a table of a person's own, or what
 AVL or Datcom say; what is known of the aircraft widens the intervals
-(`aerodynamics/derivative_conversion.py`).
+(`conversion/derivative_conversion.py`).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from host.files.quantities import Quantity
 from host.files.user_text import shown
 from host.instrument.deviations import sensor_error_model
 from host.instrument.error_labels import ERROR_LABELS
-from host.sysid.aerodynamics.derivative_conversion import (
+from host.sysid.conversion.derivative_conversion import (
     COEFFICIENTS,
     CONSIDERED_ERRORS,
     DERIVATIVES,

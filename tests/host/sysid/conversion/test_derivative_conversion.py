@@ -13,7 +13,7 @@ from host.arrays import Array
 from host.errors import IdentificationError
 from host.instrument.deviations import sensor_error_model
 from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
-from host.sysid.aerodynamics.derivative_conversion import (
+from host.sysid.conversion.derivative_conversion import (
     CONSIDERED_ERRORS,
     ConversionPoint,
     Quantities,

@@ -1,0 +1,1 @@
+"""Derivatives and coefficients of each other."""
