@@ -13,17 +13,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from host.arrays import Array
 from host.sysid.flight.one_step import one_step_of
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.templates import Trim
+from host.sysid.numerics.white_noise import white_deviation
 
 DRAWS, DRAW_SEED = 40, 3
-MEDIAN_TO_SIGMA = 1.4826  # of a normal distribution
-THIRD_DIFFERENCE_POWER = 20.0  # over that of white noise
 
 
 def with_column_noise(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim) -> FitResult:
@@ -56,14 +54,3 @@ def with_column_noise(result: FitResult, maneuvers: Sequence[Maneuver], trim: Tr
     return replace(
         result, covariance=result.covariance + consider_covariance(moved / np.sqrt(DRAWS))
     )
-
-
-def white_deviation(records: Sequence[Array]) -> Array:
-    """Return the deviation of white noise of every column; quick motion counts little.
-
-    Parameters
-    ----------
-    records : sequence of Array, each (samples, k) or (samples,)
-    """
-    third = np.abs(np.concatenate([np.diff(columns, n=3, axis=0) for columns in records]))
-    return np.asarray(MEDIAN_TO_SIGMA * np.median(third, axis=0) / np.sqrt(THIRD_DIFFERENCE_POWER))

@@ -8,13 +8,13 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from host.arrays import Array, IntArray
-from host.sysid.flight.column_noise import white_deviation
 from host.sysid.flight.data_finding import Feedback, Finding
-from host.sysid.flight.maneuver_detection import LEAD_S, DetectedManeuver, runs_of
+from host.sysid.flight.maneuver_detection import LEAD_S, STILL_RAD, DetectedManeuver, runs_of
 from host.sysid.flight.maneuver_selection import FEWEST
 from host.sysid.numerics.feedback_fast import fast_feedback
 from host.sysid.numerics.feedback_legs import feedback_legs
 from host.sysid.numerics.state_feedback import FeedbackLaw, feedback_law
+from host.sysid.numerics.white_noise import white_deviation
 
 LATERAL = ("p_radps", "r_radps", "beta_rad", "phi_rad", "psi_rad")
 # What a surface may follow, and by whose maneuvers it is judged.
@@ -49,7 +49,6 @@ LABEL = {
     "alpha_rad": "alpha", "beta_rad": "beta", "p_radps": "p", "q_radps": "q", "r_radps": "r",
 }  # fmt: skip
 CAUSES = {"rudder_rad": ("a yaw damper", "an autopilot"), "": ("an autopilot", "a stabiliser")}
-STILL_RAD = 1e-3  # a surface that moves less moves nothing
 LEAST_LAG_S = 0.05  # a shorter one cannot be told from a delay
 
 

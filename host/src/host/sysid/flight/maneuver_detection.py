@@ -19,11 +19,12 @@ from host.sysid.flight.free_response import with_free_response
 from host.sysid.flight.logged_inputs import logged_inputs
 from host.sysid.flight.overlapping_inputs import SUSTAINED, bounded, without_echoes
 from host.sysid.flight.sustained_inputs import sustained_inputs
-from host.sysid.flight.unit_sign_checks import THROTTLE
 
 LAG_S = 0.12  # a hand needs about this long for one edge
 LEAST_EDGE_RAD = 0.025  # 1.4 degrees: a pulse smaller than this excites nothing on a trainer
 LEAST_EDGE_THROTTLE = 0.12
+STILL_RAD = 1e-3  # a surface that moves less moves nothing
+THROTTLE = (-0.2, 1.2)  # beyond, it is no share of full
 ACTIVITY = 6.0  # edges stand out by this many robust deviations of the surface's activity
 JOIN_S = 1.6  # between edges of one input; wider for a throttle pulse
 JOIN_THROTTLE_S = 3.0

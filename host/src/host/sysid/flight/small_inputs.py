@@ -9,10 +9,8 @@ import numpy as np
 from host.arrays import Array
 from host.constants import DEG_PER_RAD
 from host.sysid.flight.data_finding import Finding
-from host.sysid.flight.maneuver_detection import FLYING_SHARE, DetectedManeuver
+from host.sysid.flight.maneuver_detection import FLYING_SHARE, STILL_RAD, DetectedManeuver
 from host.sysid.flight.maneuver_selection import FEWEST, SURFACES, select_maneuvers
-
-STILL_RAD = 1e-3  # a surface that moves less excites nothing
 
 
 def whole_flight(columns: Mapping[str, Array]) -> tuple[list[DetectedManeuver], list[Finding]]:

@@ -43,7 +43,6 @@ from host.sysid.aerodynamics.thrust_terms import thrust_terms
 from host.sysid.aerodynamics.unmeasured_motion import with_unmeasured
 from host.sysid.aerodynamics.varying_airspeed import MEASURED, SECOND_ORDER_TERMS, VaryingModel
 from host.sysid.estimators.gust_model import gust_deviation_mps
-from host.sysid.flight.column_noise import white_deviation
 from host.sysid.flight.one_step import CERTAIN_SD, HALF_WAY, OneStep, one_step_of
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
@@ -53,6 +52,7 @@ from host.sysid.models.state_space_model import LinearModel, Parameter
 from host.sysid.models.templates import Trim
 from host.sysid.models.thrust_column import ThrustColumn
 from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics.white_noise import white_deviation
 
 TURNED_ANGLES = ("alpha_rad", "beta_rad")
 REMAINDER_SHARE = 0.25  # of the step: what one step and terms of second order leave open

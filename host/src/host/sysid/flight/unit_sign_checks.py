@@ -15,6 +15,7 @@ from host.constants import GRAVITY_MPS2
 from host.sysid.flight.data_finding import HINT, Finding
 from host.sysid.flight.identity_factors import SIGN_CORRELATION, correlation
 from host.sysid.flight.kinematic_checks import BLOCK_S, FEWEST, block_means, consistent
+from host.sysid.flight.maneuver_detection import THROTTLE
 
 BOUNDED = ("alpha_rad", "beta_rad", "theta_rad")
 DOUBTFUL_RAD = 1.0  # of such an angle in flight, and of a surface at any moment
@@ -24,7 +25,6 @@ SIGN_DEVIATIONS = 10.0  # deviations
 WITHOUT_GRAVITY = 0.5  # of the size: with less along z, weight is not in it
 DENSITY = (0.4, 1.6)
 STATIC_PA = (2e4, 1.2e5)
-THROTTLE = (-0.2, 1.2)
 PRESSURE_RATIO = (0.5, 2.0)
 # Left side, regressors beside the surface, expected sign: elevator positive trailing edge down.
 SURFACES = {
