@@ -129,7 +129,7 @@ def first_answers(folder: Path) -> bool:
 def imports_s() -> float:
     """Return the processor seconds that Python and the imports of the verb take alone."""
     code = "import host.sysid.flight.linear_estimator, host.sysid.answer.verdict, host.log"
-    code += ", host.sysid.flight.flight_tables, host.sysid.compatibility.reconstruction"
+    code += ", host.sysid.flight.flight_tables, host.sysid.reconstruction.reconstruction"
     code += ", host.aircraft.mass_properties"
     before = os.times()
     subprocess.run([sys.executable, "-c", code], check=True)

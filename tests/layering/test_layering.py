@@ -62,7 +62,7 @@ HOST_FLOORS: dict[str, tuple[str, ...]] = {
     "host.fleet": ("statistics", "sources", "tasks", "dataset", "pages", "runs"),
     "host.twin": ("faults", "testcard", "flight", "sensors", "ground", "recorder", "outcome"),
     "host.sysid": (
-        *("models", "numerics", "estimators", "aerodynamics", "conversion", "compatibility"),
+        *("models", "numerics", "estimators", "aerodynamics", "conversion", "reconstruction"),
         *("flight", "coefficients", "answer", "pipeline"),
     ),
 }

@@ -8,7 +8,7 @@ from host.fleet.statistics.changes import BASELINE, ChangeTest
 from host.fleet.statistics.loaded_flight import LoadedFlight
 from host.fleet.statistics.watched_quantities import flight_spread, with_watched
 from host.fleet.tasks.surface_response import surface_quantities, surface_response
-from host.sysid.compatibility.servo_response import servo_response
+from host.sysid.reconstruction.servo_response import servo_response
 from studies.fleet_changes import Watched
 
 

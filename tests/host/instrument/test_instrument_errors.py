@@ -18,9 +18,9 @@ from host.instrument.instrument_errors import (
 from host.physical.calibration import load_calibration
 from host.physical.recording import Recording
 from host.resources import resource
-from host.sysid.compatibility.path_preparation import prior
 from host.sysid.flight.flight_tables import FlightColumns
 from host.sysid.pipeline import aircraft_data
+from host.sysid.reconstruction.path_preparation import prior
 from host.twin.flight.draws import DRAWN_ERRORS, draw
 from host.twin.outcome.virtual_calibration import calibration
 

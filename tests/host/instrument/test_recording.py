@@ -16,8 +16,8 @@ from host.physical.recording import SURFACES, Recording
 from host.readers.even_grid import even_columns
 from host.readers.recorded import recording_of_table
 from host.resources import resource
-from host.sysid.compatibility.servo_response import servo_response, surface_positions
 from host.sysid.pipeline import aircraft_data, at_hand, identify_columns
+from host.sysid.reconstruction.servo_response import servo_response, surface_positions
 from host.twin.faults import Fault
 from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight

@@ -11,7 +11,7 @@ from host.aircraft.linear_aircraft import load
 from host.errors import IdentificationError
 from host.live.test_point.between_rows import drawn_rows, finer
 from host.planning.aircraft_response import STEP_S, AircraftResponse
-from host.sysid.compatibility.servo_response import servo_response
+from host.sysid.reconstruction.servo_response import servo_response
 from host.twin.testcard.cards import Segment
 from host.twin.testcard.input_shapes import STEPS, staircase
 from numpy.typing import NDArray

@@ -14,7 +14,7 @@ from host.export.toml import dumps
 from host.planning import predicted_widths
 from host.planning.point_widths import PointPromise, promise_points
 from host.planning.predicted_widths import Prediction, predict_widths
-from host.sysid.compatibility.reconstruction import Compatibility, reconstruct
+from host.sysid.reconstruction.reconstruction import Compatibility, reconstruct
 from host.twin.testcard.cards import Card, parse
 
 DOCUMENT: dict[str, object] = {

@@ -12,7 +12,7 @@ from host.sysid.coefficients import CoefficientFit, standard_model
 from host.sysid.coefficients.aero_equations import KINEMATIC, Equation, FlightHistory, equations
 from host.sysid.coefficients.coefficient_search import fit_coefficients
 from host.sysid.coefficients.window_spectra import Window
-from host.sysid.compatibility.inverse_sensor_model import Record
+from host.sysid.reconstruction.inverse_sensor_model import Record
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
 

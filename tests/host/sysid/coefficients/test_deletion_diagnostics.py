@@ -29,8 +29,8 @@ from host.sysid.coefficients.window_spectra import (
     WindowTransform,
     window_transform,
 )
-from host.sysid.compatibility.inverse_sensor_model import Spectrum
 from host.sysid.numerics.maneuver_agreement import scatter_test
+from host.sysid.reconstruction.inverse_sensor_model import Spectrum
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
 

@@ -17,7 +17,7 @@ from host.sysid.coefficients.slow_gusts import (
     gust_strength,
 )
 from host.sysid.coefficients.window_spectra import Window, WindowTransform, window_transform
-from host.sysid.compatibility.inverse_sensor_model import Record
+from host.sysid.reconstruction.inverse_sensor_model import Record
 from numpy.polynomial import legendre
 
 NAME = "ultrastick25e"

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from host.instrument.deviations import sensor_error_model
 from host.physical.recording import FOREIGN, OWN
-from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.estimators.filter_error import fit_filter_error
 from host.sysid.estimators.gust_model import gust_model
 from host.sysid.estimators.innovation_search import noise_floor
@@ -17,6 +16,7 @@ from host.sysid.flight.reconstructed_flight import (
     reconstruct_flight,
 )
 from host.sysid.models import Maneuver, Trim, template
+from host.sysid.reconstruction.reconstruction import Compatibility
 from scipy import signal
 
 DT_S, FINE = 0.02, 10

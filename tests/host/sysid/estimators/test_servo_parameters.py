@@ -13,7 +13,6 @@ from host.errors import IdentificationError
 from host.instrument.deviations import unknown_sensors
 from host.instrument.servo_prior import ServoPrior, servo_prior
 from host.physical.recording import Recording
-from host.sysid.compatibility.servo_response import behind_servos
 from host.sysid.estimators import fit
 from host.sysid.estimators.servo_parameters import (
     ServoEstimate,
@@ -24,6 +23,7 @@ from host.sysid.estimators.servo_parameters import (
 )
 from host.sysid.models import FitResult, LinearModel, Maneuver, Trim, template
 from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.reconstruction.servo_response import behind_servos
 
 import host
 

@@ -20,20 +20,6 @@ from host.sysid.aerodynamics.coefficient_table import (
 )
 from host.sysid.answer import true_coefficients, verdict_lines
 from host.sysid.answer.estimate_lines import model_lines
-from host.sysid.compatibility.path_preparation import density_share
-from host.sysid.compatibility.reconstruction import (
-    Compatibility,
-    NoAgreementError,
-    SensorErrorEstimate,
-)
-from host.sysid.compatibility.sensor_corrections import (
-    INSTANTANEOUS_ERRORS,
-    advance_delayed,
-    correct_columns,
-    corrections,
-    pressure_share,
-    residual_deviations,
-)
 from host.sysid.flight import linear_answer, linear_model
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.sampling_error import HOLD
@@ -42,6 +28,20 @@ from host.sysid.models import Trim, template
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.pipeline import flight_preparation
+from host.sysid.reconstruction.path_preparation import density_share
+from host.sysid.reconstruction.reconstruction import (
+    Compatibility,
+    NoAgreementError,
+    SensorErrorEstimate,
+)
+from host.sysid.reconstruction.sensor_corrections import (
+    INSTANTANEOUS_ERRORS,
+    advance_delayed,
+    correct_columns,
+    corrections,
+    pressure_share,
+    residual_deviations,
+)
 
 import host
 from tests.host.sysid import recorded

@@ -29,9 +29,9 @@ from host.sysid.answer import trust_rules
 from host.sysid.answer.coefficient_rules import input_feedback, open_finding
 from host.sysid.answer.feedback_pairs import feedback_of
 from host.sysid.coefficients import CoefficientFit
-from host.sysid.compatibility.sensor_dynamics import SERVO_DELAY
 from host.sysid.flight.data_finding import finding_document, open_channels
 from host.sysid.pipeline import Identification, identify
+from host.sysid.reconstruction.sensor_dynamics import SERVO_DELAY
 
 _GPS_EPOCH = datetime(1980, 1, 6, tzinfo=UTC)
 _POSTERIOR_PRIOR_RATIO = 0.9  # an estimate whose deviation is nearly its prior's is left out

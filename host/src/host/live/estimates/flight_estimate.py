@@ -23,12 +23,12 @@ from host.sysid.coefficients.coefficient_estimator import (
     CoefficientEstimator,
     coefficient_estimator,
 )
-from host.sysid.compatibility.servo_response import surface_positions
 from host.sysid.flight.flight_tables import FlightColumns, read_flight_columns
 from host.sysid.flight.maneuver_detection import DetectedManeuver, detect_maneuvers
 from host.sysid.flight.reconstructed_flight import maneuver_name, reconstruct_flight
 from host.sysid.pipeline import AircraftData, aircraft_data
 from host.sysid.pipeline.surface_travel import with_surface_angles
+from host.sysid.reconstruction.servo_response import surface_positions
 from host.twin.testcard.cards import Segment
 from host.twin.testcard.input_shapes import STEPS
 

@@ -20,8 +20,8 @@ from host.arrays import Array
 from host.errors import IdentificationError
 from host.physical.sampling import GAP_FACTOR
 from host.planning.aircraft_response import STEP_S, AircraftResponse
-from host.sysid.compatibility.linear_smoother import Step, smooth
-from host.sysid.compatibility.servo_response import servo_response
+from host.sysid.reconstruction.linear_smoother import Step, smooth
+from host.sysid.reconstruction.servo_response import servo_response
 from host.twin.testcard.cards import Segment
 
 FEWEST = 30  # rows: 1.5 s of the radio

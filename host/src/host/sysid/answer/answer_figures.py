@@ -24,11 +24,11 @@ from host.sysid.answer.figure_kinds import (
 from host.sysid.answer.linear_verdict import not_relied_on
 from host.sysid.answer.mat_file import labels
 from host.sysid.answer.truth_comparison import true_coefficients, true_poles
-from host.sysid.compatibility.inverse_sensor_model import FIT_RATE_HZ
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.models.diagnostics import reference_values
 from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.parameter_units import parameter_unit
+from host.sysid.reconstruction.inverse_sensor_model import FIT_RATE_HZ
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,9 +11,9 @@ from host.sysid.answer.linear_verdict import linear_verdict
 from host.sysid.answer.marks import Verdict
 from host.sysid.answer.model_agreement import disagreements_of_models
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence
-from host.sysid.compatibility.sensor_corrections import correction_lines
 from host.sysid.flight.data_finding import open_channels
 from host.sysid.flight.linear_answer import Answer
+from host.sysid.reconstruction.sensor_corrections import correction_lines
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer

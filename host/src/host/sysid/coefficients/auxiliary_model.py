@@ -21,9 +21,9 @@ from host.constants import GRAVITY_MPS2
 from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel
 from host.sysid.coefficients.aero_equations import FlightHistory
-from host.sysid.compatibility.inverse_sensor_model import ATTITUDE_CROSSOVER_RADPS, Record
 from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.recursion import simulate
+from host.sysid.reconstruction.inverse_sensor_model import ATTITUDE_CROSSOVER_RADPS, Record
 
 LEVELLING_PERS = 0.3  # the pilot brings the wings back
 MEAN_DRAG = 0.04  # the mean of a force is removed again

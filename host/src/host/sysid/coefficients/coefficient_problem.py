@@ -26,7 +26,7 @@ from host.sysid.coefficients.window_spectra import (
     equation_spectra,
     window_transform,
 )
-from host.sysid.compatibility.inverse_sensor_model import (
+from host.sysid.reconstruction.inverse_sensor_model import (
     Record,
     Spectrum,
     apply_sensor_errors,

@@ -50,7 +50,7 @@ from host.sysid.coefficients.normal_equations import Prior, solve_normal_equatio
 from host.sysid.coefficients.slow_gusts import gust_information, gust_regressors, gust_strength
 from host.sysid.coefficients.trim_derivatives import DerivativesAtTrim
 from host.sysid.coefficients.window_spectra import ResidualSpectra, Window, residual_spectra
-from host.sysid.compatibility.inverse_sensor_model import decimate, usable_length
+from host.sysid.reconstruction.inverse_sensor_model import decimate, usable_length
 
 # Rounds with the coefficients alone, then with sensor errors and slow gusts.
 COEFFICIENT_ROUNDS, JOINT_ROUNDS = 3, 2

@@ -23,7 +23,7 @@ from host.sysid.coefficients.window_spectra import (
     equation_weight,
     in_band,
 )
-from host.sysid.compatibility.inverse_sensor_model import Spectrum
+from host.sysid.reconstruction.inverse_sensor_model import Spectrum
 
 # Share of the information on each term that the other maneuvers must have.
 LEAST_REMAINING_SHARE = 0.1

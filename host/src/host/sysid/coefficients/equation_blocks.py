@@ -22,7 +22,7 @@ from host.sysid.coefficients.window_spectra import (
     in_band,
     trend_count,
 )
-from host.sysid.compatibility.inverse_sensor_model import Spectrum
+from host.sysid.reconstruction.inverse_sensor_model import Spectrum
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.coefficients.window_spectra import EquationKey, WindowTransform
-from host.sysid.compatibility.inverse_sensor_model import Spectrum
+from host.sysid.reconstruction.inverse_sensor_model import Spectrum
 
 LEGENDRE_TERMS = 3  # mean, slope and curvature of a gust over a maneuver; faster ones are noise
 # Scale lengths along and vertical at 100 m over the ground, MIL-F-8785C 3.7.3.

@@ -13,7 +13,7 @@ import numpy as np
 from host.arrays import Array, BoolArray, IntArray
 from host.errors import IdentificationError
 from host.sysid.coefficients.aero_equations import KINEMATIC, LATERAL, LONGITUDINAL, Equation
-from host.sysid.compatibility.inverse_sensor_model import Spectrum
+from host.sysid.reconstruction.inverse_sensor_model import Spectrum
 
 LOW_HZ, HIGH_HZ = 0.1, 4.5
 KINEMATIC_LOW_HZ = 0.4  # below, the attitude filter's own errors dominate

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from host.sysid.compatibility.calibration_consistency import (
+from host.sysid.flight.data_finding import Finding
+from host.sysid.reconstruction.calibration_consistency import (
     ALL,
     calibration_lines,
     inconsistent_groups,
 )
-from host.sysid.compatibility.reconstruction import Compatibility
-from host.sysid.flight.data_finding import Finding
+from host.sysid.reconstruction.reconstruction import Compatibility
 
 RATES = ("p_radps", "q_radps", "r_radps")
 FORCES = ("ax_mps2", "ay_mps2", "az_mps2")

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.sysid.compatibility.servo_response import behind_servos
 from host.sysid.estimators.filter_error_gust import fit_gust_state
 from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.servo_parameters import (
@@ -23,6 +22,7 @@ from host.sysid.flight.reconstructed_flight import FlownManeuver, ReconstructedF
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
+from host.sysid.reconstruction.servo_response import behind_servos
 
 
 def servo_of(

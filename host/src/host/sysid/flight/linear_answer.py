@@ -13,7 +13,6 @@ from host.sysid.aerodynamics.coefficient_table import (
     CoefficientParts,
     CoefficientTable,
 )
-from host.sysid.compatibility.sensor_corrections import Correction
 from host.sysid.estimators.servo_parameters import ServoEstimate
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.flight.prediction_limits import Prediction
@@ -30,6 +29,7 @@ from host.sysid.models.state_space_model import DelayGroup, LinearModel
 from host.sysid.models.templates import Trim
 from host.sysid.models.thrust_column import ThrustColumn
 from host.sysid.numerics.input_coherence import InputCoherence
+from host.sysid.reconstruction.sensor_corrections import Correction
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,6 @@ from host.sysid.aerodynamics.coefficient_table import (
     trim_of,
 )
 from host.sysid.aerodynamics.thrust_terms import THRUST_BESIDE, with_thrust
-from host.sysid.compatibility.sensor_corrections import corrections
 from host.sysid.estimators.filter_error_gust import without_gust_parameters
 from host.sysid.estimators.gust_model import VANES
 from host.sysid.estimators.gust_penetration import without_gust_penetration
@@ -74,6 +73,7 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.modal_analysis import modes
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
+from host.sysid.reconstruction.sensor_corrections import corrections
 
 FREE = ("output", "innovation")  # residuals of methods that simulate
 

@@ -17,8 +17,6 @@ from host.sysid.aerodynamics.coefficient_table import (
     coefficient_parts,
 )
 from host.sysid.aerodynamics.path_thrust import path_thrust
-from host.sysid.compatibility.reconstruction import Compatibility
-from host.sysid.compatibility.sensor_dynamics import DELAYED_COLUMNS, IMU_DELAY, SERVO_DELAY
 from host.sysid.estimators.coherence_inflation import inflate_by_coherence, widened_to
 from host.sysid.estimators.gust_penetration import with_unknown_roll_lag
 from host.sysid.estimators.missing_control import missing_control, widened_by_missing_control
@@ -41,6 +39,8 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
 from host.sysid.numerics.maneuver_agreement import inflate_covariance, maneuver_agreement
 from host.sysid.numerics.score_variance import white_fit_variance
+from host.sysid.reconstruction.reconstruction import Compatibility
+from host.sysid.reconstruction.sensor_dynamics import DELAYED_COLUMNS, IMU_DELAY, SERVO_DELAY
 
 LEAST_COMMANDED = 0.25  # of all samples, in maneuvers that a test input made
 WHITE = "output error (white)"  # its noise is judged beside what the inputs drive

@@ -10,7 +10,6 @@ import numpy as np
 from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, deviations, unknown_sensors
 from host.physical.recording import OWN
-from host.sysid.compatibility.path_preparation import NO_OFFSETS
 from host.sysid.estimators.method_registry import find_method
 from host.sysid.estimators.start_values import regression_estimates
 from host.sysid.flight.filter_step import (
@@ -34,6 +33,7 @@ from host.sysid.models.state_space_model import (
 )
 from host.sysid.models.templates import TEMPLATES, Trim, template
 from host.sysid.numerics.equation_filter_problem import needs_compiler
+from host.sysid.reconstruction.path_preparation import NO_OFFSETS
 
 AXIS_OF = {
     "longitudinal": ("elevator_rad",),

@@ -21,22 +21,22 @@ from host.instrument.servo_prior import ServoPrior
 from host.near_names import like
 from host.physical.recording import OWN, SURFACES
 from host.readers.column_sampling import sampled_name
-from host.sysid.compatibility.flow_angles import FlowAngles
-from host.sysid.compatibility.position_correction import transfer_to_cg
-from host.sysid.compatibility.reconstruction import Compatibility
-from host.sysid.compatibility.sensor_corrections import (
-    advance_delayed,
-    correct_columns,
-    corrections,
-    pressure_share,
-)
-from host.sysid.compatibility.sensor_dynamics import columns_at_cg
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.input_kinks import with_means_of_motion
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
 from host.sysid.numerics.between_samples import with_means_of_smooth_motion
+from host.sysid.reconstruction.flow_angles import FlowAngles
+from host.sysid.reconstruction.position_correction import transfer_to_cg
+from host.sysid.reconstruction.reconstruction import Compatibility
+from host.sysid.reconstruction.sensor_corrections import (
+    advance_delayed,
+    correct_columns,
+    corrections,
+    pressure_share,
+)
+from host.sysid.reconstruction.sensor_dynamics import columns_at_cg
 
 # Of our IMU's attitude: it takes acceleration for gravity and is 0.7 to 1.1 deg off, for one or two
 # seconds. A filter took it for a sensor without noise: on the card `demo` Cm_q was 2 % smaller.

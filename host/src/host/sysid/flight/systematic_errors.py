@@ -16,14 +16,6 @@ import numpy as np
 from host.aircraft.mass_properties import Condition
 from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate, trim_of
-from host.sysid.compatibility.reconstruction import Compatibility
-from host.sysid.compatibility.sensor_corrections import (
-    INSTANTANEOUS_ERRORS,
-    correct_columns,
-    pressure_share,
-    residual_deviations,
-)
-from host.sysid.compatibility.sensor_dynamics import perturb_columns, residual_errors
 from host.sysid.estimators.gust_penetration import penetration_of, without_gust_penetration
 from host.sysid.flight.one_step import one_step_of
 from host.sysid.models.consider_covariance import consider_covariance
@@ -34,6 +26,14 @@ from host.sysid.models.state_space_model import LinearModel, without_outputs
 from host.sysid.models.templates import TEMPLATES, Trim, template
 from host.sysid.numerics.nonlinear_problem import output_problem
 from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.reconstruction.reconstruction import Compatibility
+from host.sysid.reconstruction.sensor_corrections import (
+    INSTANTANEOUS_ERRORS,
+    correct_columns,
+    pressure_share,
+    residual_deviations,
+)
+from host.sysid.reconstruction.sensor_dynamics import perturb_columns, residual_errors
 
 TRIMMING = ("airspeed_mps", "alpha_rad", "theta_rad", "qbar_pa", "density_kgpm3")
 

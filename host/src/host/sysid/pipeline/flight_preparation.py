@@ -12,16 +12,6 @@ from host.instrument.deviations import unknown_sensors
 from host.instrument.error_labels import recording_notes
 from host.instrument.servo_prior import servo_prior
 from host.physical.calibration import load_calibration
-from host.sysid.compatibility.flow_angles import reconstruct_flow_angles
-from host.sysid.compatibility.ground_attitude import update_by_standstill
-from host.sysid.compatibility.reconstruction import (
-    Compatibility,
-    NoAgreementError,
-    by_calibration_alone,
-    reconstruct,
-)
-from host.sysid.compatibility.sensor_corrections import without_estimated_delays
-from host.sysid.compatibility.servo_response import commands_of, surface_positions
 from host.sysid.flight.agreement_findings import calibration_findings, disagreement
 from host.sysid.flight.airspeed_scale import airspeed_scale_findings
 from host.sysid.flight.data_finding import Finding
@@ -33,6 +23,16 @@ from host.sysid.flight.reconstructed_flight import ReconstructedFlight, reconstr
 from host.sysid.flight.small_inputs import whole_flight
 from host.sysid.pipeline.flight_at_hand import FlightAtHand
 from host.sysid.pipeline.surface_travel import with_surface_angles
+from host.sysid.reconstruction.flow_angles import reconstruct_flow_angles
+from host.sysid.reconstruction.ground_attitude import update_by_standstill
+from host.sysid.reconstruction.reconstruction import (
+    Compatibility,
+    NoAgreementError,
+    by_calibration_alone,
+    reconstruct,
+)
+from host.sysid.reconstruction.sensor_corrections import without_estimated_delays
+from host.sysid.reconstruction.servo_response import commands_of, surface_positions
 
 
 @dataclass(frozen=True, slots=True)

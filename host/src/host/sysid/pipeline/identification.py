@@ -20,11 +20,6 @@ from host.sysid.answer.trust_rules import Evidence
 from host.sysid.answer.truth_comparison import truth_document, truth_report_lines
 from host.sysid.answer.verdict import removed_error_lines, verdict_lines
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
-from host.sysid.compatibility.reconstruction import (
-    Compatibility,
-    compatibility_document,
-    compatibility_lines,
-)
 from host.sysid.flight.data_finding import Finding, finding_document
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
@@ -37,6 +32,11 @@ from host.sysid.pipeline.notebook_html import answer_html
 from host.sysid.pipeline.notebook_pictures import Pictures
 from host.sysid.pipeline.reading_options import ReadingOptions
 from host.sysid.pipeline.simulation import Simulation, identified_models, simulate
+from host.sysid.reconstruction.reconstruction import (
+    Compatibility,
+    compatibility_document,
+    compatibility_lines,
+)
 
 if TYPE_CHECKING:
     import pandas as pd

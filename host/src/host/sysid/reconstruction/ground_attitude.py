@@ -16,7 +16,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2, NORMAL_95
-from host.sysid.compatibility.reconstruction import POSTERIOR_PRIOR_RATIO, Compatibility
+from host.sysid.reconstruction.reconstruction import POSTERIOR_PRIOR_RATIO, Compatibility
 
 TILT, BIAS = "imu_tilt_y_rad", "accel_bias_x_mps2"
 LEAST_S = 0.5  # of a standstill; our own log may begin a second before the launch

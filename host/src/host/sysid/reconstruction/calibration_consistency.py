@@ -9,7 +9,7 @@ import numpy as np
 from scipy import special
 
 from host.arrays import Array
-from host.sysid.compatibility.flight_path import FLOW, INERTIAL, PITOT, PLACES
+from host.sysid.reconstruction.flight_path import FLOW, INERTIAL, PITOT, PLACES
 
 # Groups of errors that kinematics can observe, by their names in the file, and their unknowns.
 OBSERVABLE_GROUPS: dict[str, tuple[str, ...]] = {

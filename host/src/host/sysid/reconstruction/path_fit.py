@@ -16,7 +16,8 @@ import numpy as np
 
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.sysid.compatibility.flight_path import (
+from host.sysid.numerics.ar_noise import ArNoise, fit_ar, lagged_moments
+from host.sysid.reconstruction.flight_path import (
     AIR,
     DELAY_DIFFERENCE,
     DELAYS,
@@ -26,7 +27,6 @@ from host.sysid.compatibility.flight_path import (
     PLACES,
     PathProblem,
 )
-from host.sysid.numerics.ar_noise import ArNoise, fit_ar, lagged_moments
 
 AR_ORDER = 2  # of the residuals: a gust and a sensor
 MOST_ITERATIONS = 25

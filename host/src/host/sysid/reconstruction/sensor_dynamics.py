@@ -18,15 +18,15 @@ from host.constants import NORMAL_95
 from host.instrument.deviations import SensorErrorModel
 from host.instrument.deviations import deviations as prior_deviations
 from host.physical.recording import SURFACES
-from host.sysid.compatibility.flight_path import AIR, DELAYS
-from host.sysid.compatibility.path_preparation import (
+from host.sysid.reconstruction.flight_path import AIR, DELAYS
+from host.sysid.reconstruction.path_preparation import (
     NO_OFFSETS,
     compensate_friction,
     compensate_lowpass,
     vane_delay_by_file,
 )
-from host.sysid.compatibility.position_correction import transfer_to_cg
-from host.sysid.compatibility.reconstruction import Compatibility
+from host.sysid.reconstruction.position_correction import transfer_to_cg
+from host.sysid.reconstruction.reconstruction import Compatibility
 
 VANE_DELAY, PITOT_DELAY = DELAYS
 IMU_DELAY = "imu_delay_s"

@@ -14,9 +14,9 @@ import numpy as np
 from host.arrays import Array
 from host.constants import NORMAL_95
 from host.people_units import people_name
-from host.sysid.compatibility.flight_path import AIR, DELAYS, FLOW, INERTIAL, PITOT
-from host.sysid.compatibility.path_preparation import density_share
-from host.sysid.compatibility.reconstruction import Compatibility
+from host.sysid.reconstruction.flight_path import AIR, DELAYS, FLOW, INERTIAL, PITOT
+from host.sysid.reconstruction.path_preparation import density_share
+from host.sysid.reconstruction.reconstruction import Compatibility
 
 RATES = tuple(f"{a}_radps" for a in "pqr")
 FORCES = tuple(f"a{a}_mps2" for a in "xyz")

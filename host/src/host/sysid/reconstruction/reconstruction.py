@@ -20,14 +20,14 @@ from host.constants import GRAVITY_MPS2, NORMAL_95
 from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel
 from host.people_units import people_name
-from host.sysid.compatibility.calibration_consistency import (
+from host.sysid.reconstruction.calibration_consistency import (
     ConsistencyTest,
     calibration_lines,
     consistency_tests,
 )
-from host.sysid.compatibility.flight_path import AIR, DELAYS, FLOW, GPS, INERTIAL
-from host.sysid.compatibility.path_fit import fit_path
-from host.sysid.compatibility.path_preparation import (
+from host.sysid.reconstruction.flight_path import AIR, DELAYS, FLOW, GPS, INERTIAL
+from host.sysid.reconstruction.path_fit import fit_path
+from host.sysid.reconstruction.path_preparation import (
     prepare_path_problem,
     prior,
     vane_delay_by_file,

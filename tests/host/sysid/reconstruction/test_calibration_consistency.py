@@ -5,21 +5,21 @@ import pytest
 from host.aircraft.mass_properties import airframe_data
 from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
-from host.sysid.compatibility.calibration_consistency import (
+from host.sysid.flight.agreement_findings import calibration_findings
+from host.sysid.reconstruction.calibration_consistency import (
     OBSERVABLE_GROUPS,
     SIGNIFICANCE,
     ConsistencyTest,
     calibration_lines,
     consistency_tests,
 )
-from host.sysid.compatibility.path_preparation import prior
-from host.sysid.compatibility.reconstruction import (
+from host.sysid.reconstruction.path_preparation import prior
+from host.sysid.reconstruction.reconstruction import (
     Compatibility,
     compatibility_document,
     compatibility_lines,
     reconstruct,
 )
-from host.sysid.flight.agreement_findings import calibration_findings
 from studies.foreign.flight import Air
 from studies.independent import answer_with_file
 

@@ -18,7 +18,8 @@ from host.instrument.deviations import (
     vane_delay_s,
 )
 from host.physical.recording import FOREIGN
-from host.sysid.compatibility.flight_path import (
+from host.sysid.numerics.differentiation import local_polynomial
+from host.sysid.reconstruction.flight_path import (
     AIR,
     DELAY_DIFFERENCE,
     DELAYS,
@@ -34,11 +35,10 @@ from host.sysid.compatibility.flight_path import (
     PathProblem,
     Segment,
 )
-from host.sysid.compatibility.gps_fixes import gps_fixes
-from host.sysid.compatibility.inverse_sensor_model import SLIDING_RADPS
-from host.sysid.compatibility.position_correction import transfer_to_cg
-from host.sysid.compatibility.strapdown import rotation
-from host.sysid.numerics.differentiation import local_polynomial
+from host.sysid.reconstruction.gps_fixes import gps_fixes
+from host.sysid.reconstruction.inverse_sensor_model import SLIDING_RADPS
+from host.sysid.reconstruction.position_correction import transfer_to_cg
+from host.sysid.reconstruction.strapdown import rotation
 
 BLOCK_S = 0.05  # samples are averaged over this: the motion of a trainer is far below 10 Hz
 SEGMENT_S = 12.0

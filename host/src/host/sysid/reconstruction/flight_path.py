@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.sysid.compatibility.strapdown import (
+from host.sysid.numerics.output_error_problem import Response
+from host.sysid.reconstruction.strapdown import (
     cross,
     path_sensitivities,
     rotation_from_vector,
     strapdown,
 )
-from host.sysid.numerics.output_error_problem import Response
 
 # Errors of the inertial sensors, in the order of their slopes.
 INERTIAL = (

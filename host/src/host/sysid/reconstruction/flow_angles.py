@@ -19,11 +19,11 @@ from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2, NORMAL_95
 from host.errors import IdentificationError
-from host.sysid.compatibility.flight_path import GPS, WITH_GPS
-from host.sysid.compatibility.gps_fixes import gps_fixes
-from host.sysid.compatibility.linear_smoother import Step, smooth
-from host.sysid.compatibility.reconstruction import Compatibility
-from host.sysid.compatibility.strapdown import rotation, rotation_from_vector
+from host.sysid.reconstruction.flight_path import GPS, WITH_GPS
+from host.sysid.reconstruction.gps_fixes import gps_fixes
+from host.sysid.reconstruction.linear_smoother import Step, smooth
+from host.sysid.reconstruction.reconstruction import Compatibility
+from host.sysid.reconstruction.strapdown import rotation, rotation_from_vector
 
 STEP_S = 0.04
 PASSES = 3

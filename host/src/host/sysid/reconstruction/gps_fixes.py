@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from host.arrays import Array, BoolArray
-from host.sysid.compatibility.flight_path import GPS
+from host.sysid.reconstruction.flight_path import GPS
 
 FIX_BEND_MPS = 1e-6
 

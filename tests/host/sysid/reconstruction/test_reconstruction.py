@@ -11,27 +11,27 @@ from host.aircraft.mass_properties import airframe_data
 from host.constants import GRAVITY_MPS2, NORMAL_95
 from host.errors import IdentificationError
 from host.instrument.deviations import sensor_error_model
-from host.sysid.compatibility.flight_path import (
+from host.sysid.numerics.output_error_problem import Response
+from host.sysid.reconstruction.flight_path import (
     AIR,
     GPS,
     HEIGHT,
     PathProblem,
     Segment,
 )
-from host.sysid.compatibility.path_fit import fit_path
-from host.sysid.compatibility.path_preparation import (
+from host.sysid.reconstruction.path_fit import fit_path
+from host.sysid.reconstruction.path_preparation import (
     prepare_path_problem,
     vane_delay_by_file,
 )
-from host.sysid.compatibility.reconstruction import (
+from host.sysid.reconstruction.reconstruction import (
     BY_FILE,
     compatibility_document,
     compatibility_lines,
     reconstruct,
 )
-from host.sysid.compatibility.sensor_dynamics import vane_delay_of
-from host.sysid.compatibility.strapdown import rotation, strapdown
-from host.sysid.numerics.output_error_problem import Response
+from host.sysid.reconstruction.sensor_dynamics import vane_delay_of
+from host.sysid.reconstruction.strapdown import rotation, strapdown
 from host.twin.flight.fly import FlightRecord
 from host.twin.sensors.sensor_delays import FILTERS, sensor_delays
 
