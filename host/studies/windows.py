@@ -24,8 +24,8 @@ from host.errors import IdentificationError
 from host.readers.even_grid import even_columns
 from host.sysid.answer import true_coefficients
 from host.sysid.estimators import fit
-from host.sysid.flight.maneuver_detection import FLYING_SHARE, detect_maneuvers
-from host.sysid.flight.maneuver_selection import SURFACES, joined_windows, select_maneuvers
+from host.sysid.maneuvers.maneuver_detection import FLYING_SHARE, detect_maneuvers
+from host.sysid.maneuvers.maneuver_selection import SURFACES, joined_windows, select_maneuvers
 from host.sysid.models import FitResult, LinearModel, Maneuver, Parameter, Term
 from host.sysid.numerics.output_error import covariance_of_free, minimise
 from host.sysid.numerics.output_error_problem import OutputProblem

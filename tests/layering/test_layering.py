@@ -62,8 +62,9 @@ HOST_FLOORS: dict[str, tuple[str, ...]] = {
     "host.fleet": ("statistics", "sources", "tasks", "dataset", "pages", "runs"),
     "host.twin": ("faults", "testcard", "flight", "sensors", "ground", "recorder", "outcome"),
     "host.sysid": (
-        *("models", "numerics", "estimators", "aerodynamics", "conversion", "reconstruction"),
-        *("flight", "coefficients", "answer", "pipeline"),
+        *("expressions", "models", "numerics", "estimators", "aerodynamics", "conversion"),
+        *("reconstruction", "maneuvers", "checks", "flight", "errors", "validation"),
+        *("linear", "coefficients", "answer", "pipeline"),
     ),
 }
 # Of a function of `host.verbs`, in lines without its docstring; and what only work needs.
@@ -424,7 +425,7 @@ PLANTED = [
     (
         floor_breaches,
         "host/src/host/sysid/models/state_space_model.py",
-        "import host.sysid.flight.maneuver_detection",
+        "import host.sysid.maneuvers.maneuver_detection",
     ),
     (
         floor_breaches,

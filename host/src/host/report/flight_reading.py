@@ -33,7 +33,7 @@ from host.report.gps_position import (
 )
 from host.report.shown_flight import Happening, ServoJump, ShownFlight, with_gaps
 from host.sysid.flight.flight_tables import read_columns
-from host.sysid.flight.maneuver_detection import (
+from host.sysid.maneuvers.maneuver_detection import (
     DetectedManeuver,
     Grade,
     detect_maneuvers,

@@ -11,7 +11,7 @@ from host.sysid.estimators import methods
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_model import STAGED
-from host.sysid.flight.maneuver_selection import select_maneuvers
+from host.sysid.maneuvers.maneuver_selection import select_maneuvers
 
 from tests.host.sysid.at_hand import identify
 

@@ -18,8 +18,8 @@ from host.sysid.flight.data_finding import Feedback, Finding
 from host.sysid.flight.feedback_findings import feedback_findings
 from host.sysid.flight.flight_tables import read_flight_columns
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.maneuver_detection import detect_maneuvers
-from host.sysid.flight.maneuver_selection import select_maneuvers
+from host.sysid.maneuvers.maneuver_detection import detect_maneuvers
+from host.sysid.maneuvers.maneuver_selection import select_maneuvers
 from host.sysid.models import Term
 from studies.wrong_flights import fly
 

@@ -7,7 +7,7 @@ import pytest
 from host.arrays import Array
 from host.sysid.answer import verdict_of
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models import Trim, template
 from scipy import signal
 from studies import short_records

@@ -13,7 +13,7 @@ import numpy as np
 
 from host.arrays import Array, IntArray
 from host.planning.wanted_input import RESPONSE_S, SURFACES
-from host.sysid.flight.maneuver_detection import (
+from host.sysid.maneuvers.maneuver_detection import (
     FLYING_SHARE,
     LEAST_EDGE_RAD,
     DetectedManeuver,

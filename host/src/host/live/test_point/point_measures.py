@@ -12,7 +12,7 @@ from host.arrays import Array
 from host.planning.aircraft_response import STEP_S, AircraftResponse
 from host.planning.point_widths import point_derivatives
 from host.planning.wanted_input import RESPONSE_S, SURFACES, wanted_surfaces
-from host.sysid.flight.maneuver_detection import FLYING_SHARE, LEAST_EDGE_RAD, DetectedManeuver
+from host.sysid.maneuvers.maneuver_detection import FLYING_SHARE, LEAST_EDGE_RAD, DetectedManeuver
 from host.twin.testcard.cards import Segment, input_s
 
 LEAD_S = 0.7  # before the input, of which every row counts for an estimate

@@ -26,7 +26,7 @@ from host.planning.aircraft_response import card_response
 from host.planning.next_point import INPUT_NAMES
 from host.planning.predicted_widths import LIGHT_GUSTS_MPS
 from host.planning.wanted_input import RESPONSE_S
-from host.sysid.flight.maneuver_detection import FLYING_SHARE, DetectedManeuver
+from host.sysid.maneuvers.maneuver_detection import FLYING_SHARE, DetectedManeuver
 from host.twin.testcard.cards import Card, Segment
 
 LOOKED_S = 0.5  # of the stream between two looks: a verdict is that late at most

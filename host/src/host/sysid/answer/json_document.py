@@ -17,8 +17,8 @@ from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, unpredicted_sta
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.coefficients.coefficient_fit import METHOD
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.maneuver_detection import DetectedManeuver, Grade
 from host.sysid.flight.reconstructed_flight import maneuver_name
+from host.sysid.maneuvers.maneuver_detection import DetectedManeuver, Grade
 from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.model_constants import known_constants
 from host.sysid.models.parameter_units import parameter_unit

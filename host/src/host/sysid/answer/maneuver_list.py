@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from host.constants import DEG_PER_RAD
-from host.sysid.flight.maneuver_detection import DetectedManeuver, Grade
+from host.sysid.maneuvers.maneuver_detection import DetectedManeuver, Grade
 
 
 def maneuver_lines(graded: Sequence[tuple[DetectedManeuver, Grade]]) -> list[str]:

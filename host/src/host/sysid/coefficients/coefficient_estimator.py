@@ -39,11 +39,11 @@ from host.sysid.coefficients.flight_terms import flight_terms
 from host.sysid.coefficients.hidden_lag import lagging_equations
 from host.sysid.coefficients.pooled_flights import pool_fits
 from host.sysid.coefficients.window_spectra import SHORTEST_S, ResidualSpectra, Window
-from host.sysid.flight.maneuver_detection import FLYING_SHARE, DetectedManeuver
 from host.sysid.flight.reconstructed_flight import (
     ReconstructedFlight,
     maneuver_name,
 )
+from host.sysid.maneuvers.maneuver_detection import FLYING_SHARE, DetectedManeuver
 from host.sysid.models.consider_covariance import dominant_error_source
 from host.sysid.models.modal_analysis import Mode
 

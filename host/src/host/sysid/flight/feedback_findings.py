@@ -9,8 +9,8 @@ from scipy.integrate import cumulative_trapezoid
 
 from host.arrays import Array, IntArray
 from host.sysid.flight.data_finding import Feedback, Finding
-from host.sysid.flight.maneuver_detection import LEAD_S, STILL_RAD, DetectedManeuver, runs_of
-from host.sysid.flight.maneuver_selection import FEWEST
+from host.sysid.maneuvers.maneuver_detection import LEAD_S, STILL_RAD, DetectedManeuver, runs_of
+from host.sysid.maneuvers.maneuver_selection import FEWEST
 from host.sysid.numerics.feedback_fast import fast_feedback
 from host.sysid.numerics.feedback_legs import feedback_legs
 from host.sysid.numerics.state_feedback import FeedbackLaw, feedback_law

@@ -9,13 +9,13 @@ import numpy as np
 
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.sysid.flight.maneuver_detection import grade
-from host.sysid.flight.maneuver_selection import HELD_OUT_FROM, SURFACES, joined_windows
 from host.sysid.flight.reconstructed_flight import (
     FlownManeuver,
     ReconstructedFlight,
     flown_maneuvers,
 )
+from host.sysid.maneuvers.maneuver_detection import grade
+from host.sysid.maneuvers.maneuver_selection import HELD_OUT_FROM, SURFACES, joined_windows
 
 WEAK_GRADE = 0.2
 # Over within 3 s of an input: what follows is the slow motion that these models leave out.

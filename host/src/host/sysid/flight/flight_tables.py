@@ -37,9 +37,9 @@ from host.readers.original_table import is_original, original_table
 from host.readers.recorded import commanded_by_map, recording_of_log, recording_of_table
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.finding_consequences import checked
-from host.sysid.flight.logged_inputs import input_columns
 from host.sysid.flight.measured import Measured, measured
 from host.sysid.flight.unit_sign_checks import SURFACES
+from host.sysid.maneuvers.logged_inputs import input_columns
 from host.terminal import command_line
 
 if TYPE_CHECKING:

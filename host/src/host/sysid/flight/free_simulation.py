@@ -10,8 +10,8 @@ import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.estimators.output_error_fit import fit_output_error
-from host.sysid.flight.maneuver_detection import LEAD_S
 from host.sysid.flight.window_prediction import Biases
+from host.sysid.maneuvers.maneuver_detection import LEAD_S
 from host.sysid.models.diagnostics import SignalFit, signal_fits
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver

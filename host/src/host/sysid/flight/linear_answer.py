@@ -14,8 +14,8 @@ from host.sysid.aerodynamics.coefficient_table import (
     CoefficientTable,
 )
 from host.sysid.estimators.servo_parameters import ServoEstimate
-from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.flight.prediction_limits import Prediction
+from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models.diagnostics import (
     Collinearity,
     IdentifiabilityFlag,

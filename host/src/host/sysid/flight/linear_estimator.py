@@ -43,7 +43,6 @@ from host.sysid.flight.linear_model import (
 )
 from host.sysid.flight.linear_stages import LinearEstimate, LinearIntervals, LinearValidation
 from host.sysid.flight.linear_validation import linear_validation
-from host.sysid.flight.maneuver_selection import excited_axes
 from host.sysid.flight.reconstructed_flight import (
     FlownManeuver,
     ReconstructedFlight,
@@ -63,6 +62,7 @@ from host.sysid.flight.trim_departure import (
     spin_of,
 )
 from host.sysid.flight.widest_errors import widest_errors
+from host.sysid.maneuvers.maneuver_selection import excited_axes
 from host.sysid.models.diagnostics import (
     assess_identifiability,
     collinearity,

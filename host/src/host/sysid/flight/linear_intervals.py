@@ -26,7 +26,6 @@ from host.sysid.flight.filter_step import others_recorded
 from host.sysid.flight.free_simulation import FreeResponses, free_responses
 from host.sysid.flight.linear_stages import LinearEstimate, LinearIntervals
 from host.sysid.flight.noise_model_limits import excess_over_noise_model
-from host.sysid.flight.pilot_takeover import taken_over
 from host.sysid.flight.sampling_error import hold_shift
 from host.sysid.flight.surface_motion import kink_residuals, motion_shift, surfaces_known
 from host.sysid.flight.systematic_errors import (
@@ -34,6 +33,7 @@ from host.sysid.flight.systematic_errors import (
     systematic_error_shifts,
     systematic_residuals,
 )
+from host.sysid.maneuvers.pilot_takeover import taken_over
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.numerics.input_coherence import InputCoherence, input_coherence

@@ -15,8 +15,8 @@ from host.arrays import Array
 from host.people_units import people_name
 from host.readers.column_sampling import FEWEST, Sampling, sampling_of
 from host.sysid.flight.data_finding import Finding
-from host.sysid.flight.maneuver_detection import FLYING_SHARE
 from host.sysid.flight.stuck_sensors import stuck_runs
+from host.sysid.maneuvers.maneuver_detection import FLYING_SHARE
 
 SPIKE_RANGES = 100.0  # beyond the middle: of the range that 96 % of the values lie in
 SPIKE_SHARE = 0.02  # of all values: more are no spikes

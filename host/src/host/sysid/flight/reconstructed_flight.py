@@ -23,7 +23,7 @@ from host.physical.recording import OWN, SURFACES
 from host.readers.column_sampling import sampled_name
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.input_kinks import with_means_of_motion
-from host.sysid.flight.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
 from host.sysid.numerics.between_samples import with_means_of_smooth_motion

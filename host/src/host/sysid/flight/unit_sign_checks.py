@@ -15,7 +15,7 @@ from host.constants import GRAVITY_MPS2
 from host.sysid.flight.data_finding import HINT, Finding
 from host.sysid.flight.identity_factors import SIGN_CORRELATION, correlation
 from host.sysid.flight.kinematic_checks import BLOCK_S, FEWEST, block_means, consistent
-from host.sysid.flight.maneuver_detection import THROTTLE
+from host.sysid.maneuvers.maneuver_detection import THROTTLE
 
 BOUNDED = ("alpha_rad", "beta_rad", "theta_rad")
 DOUBTFUL_RAD = 1.0  # of such an angle in flight, and of a surface at any moment

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from host.errors import IdentificationError
-from host.sysid.flight.maneuver_selection import TimeSpan
+from host.sysid.maneuvers.maneuver_selection import TimeSpan
 
 
 def path_of(name: str, given: Any) -> Path | None:

@@ -13,7 +13,7 @@ from host.errors import IdentificationError
 from host.instrument.instrument_errors import InstrumentErrors
 from host.physical.recording import Recording
 from host.sysid.flight.flight_tables import FlightColumns, read_flight_columns, source_name
-from host.sysid.flight.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.pipeline.known_aircraft import AircraftData, aircraft_data
 from host.sysid.pipeline.reading_options import ReadingOptions
 

@@ -17,10 +17,10 @@ from host.sysid.flight.airspeed_scale import airspeed_scale_findings
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.feedback_findings import feedback_findings
 from host.sysid.flight.hidden_angles import no_instrument_errors_finding, no_vanes_finding
-from host.sysid.flight.maneuver_detection import DetectedManeuver
-from host.sysid.flight.maneuver_selection import overlap_notes, select_maneuvers
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight, reconstruct_flight
 from host.sysid.flight.small_inputs import whole_flight
+from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers.maneuver_selection import overlap_notes, select_maneuvers
 from host.sysid.pipeline.flight_at_hand import FlightAtHand
 from host.sysid.pipeline.surface_travel import with_surface_angles
 from host.sysid.reconstruction.flow_angles import reconstruct_flow_angles

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from host.sysid.flight.data_finding import accepted_checks
-from host.sysid.flight.maneuver_selection import TimeSpan
+from host.sysid.maneuvers.maneuver_selection import TimeSpan
 from host.sysid.pipeline.arguments import chosen_stretches, listed, numbers_of, of_each_flight
 
 OfEach = str | Path | Sequence[str | Path | None] | None  # one for all flights, or one of each

@@ -15,9 +15,9 @@ from host.sysid.answer.mat_file import labels
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 from host.sysid.flight.free_simulation import FreeRun, fits_of, free_runs, frozen_model
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.maneuver_selection import excited_axes, merge_overlapping
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight, flown_maneuvers
 from host.sysid.flight.window_prediction import WINDOWS_S, WindowErrors, window_errors
+from host.sysid.maneuvers.maneuver_selection import excited_axes, merge_overlapping
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import CONSTANT, LinearModel

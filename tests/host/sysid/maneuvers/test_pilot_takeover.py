@@ -3,8 +3,8 @@
 from host.arrays import Array
 from host.instrument.instrument_errors import usual_errors
 from host.physical.recording import FOREIGN
-from host.sysid.flight.maneuver_detection import detect_maneuvers
-from host.sysid.flight.pilot_takeover import taken_over
+from host.sysid.maneuvers.maneuver_detection import detect_maneuvers
+from host.sysid.maneuvers.pilot_takeover import taken_over
 from studies import independent
 from studies.foreign.flight import INPUTS
 

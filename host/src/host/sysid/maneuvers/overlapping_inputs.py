@@ -17,7 +17,7 @@ import numpy as np
 from host.arrays import Array
 
 if TYPE_CHECKING:
-    from host.sysid.flight.maneuver_detection import DetectedManeuver
+    from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 
 FAINT = 0.2  # of an input: a weaker one of another surface is the pilot's, and ends no response
 WEAKER = 0.5  # of an input that it overlaps: a stronger one is no echo

@@ -10,7 +10,7 @@ import numpy as np
 
 from host.arrays import Array, IntArray
 from host.errors import IdentificationError
-from host.sysid.flight.maneuver_detection import (
+from host.sysid.maneuvers.maneuver_detection import (
     AXES,
     LEAD_S,
     DetectedManeuver,

@@ -11,8 +11,8 @@ import pytest
 from host.cli import main
 from host.errors import IdentificationError
 from host.sysid.flight.flight_tables import read_columns
-from host.sysid.flight.maneuver_detection import AXES, detect_maneuvers, grade
-from host.sysid.flight.maneuver_selection import (
+from host.sysid.maneuvers.maneuver_detection import AXES, detect_maneuvers, grade
+from host.sysid.maneuvers.maneuver_selection import (
     excited_axes,
     merge_overlapping,
     overlap_notes,

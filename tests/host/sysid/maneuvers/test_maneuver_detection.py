@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from host.sysid.flight.maneuver_detection import DetectedManeuver, detect_maneuvers
-from host.sysid.flight.maneuver_selection import joined_windows
-from host.sysid.flight.sustained_inputs import running_maximum
+from host.sysid.maneuvers.maneuver_detection import DetectedManeuver, detect_maneuvers
+from host.sysid.maneuvers.maneuver_selection import joined_windows
+from host.sysid.maneuvers.sustained_inputs import running_maximum
 from numpy.typing import NDArray
 from scipy import ndimage
 

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
-from host.sysid.flight.overlapping_inputs import SUSTAINED, flown_together
+from host.sysid.maneuvers.overlapping_inputs import SUSTAINED, flown_together
 
 if TYPE_CHECKING:
-    from host.sysid.flight.maneuver_detection import DetectedManeuver
+    from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 
 MOVED_RAD, MOVED_THROTTLE = 0.0035, 0.02  # by as much a surface leaves its rest: 0.2 deg, or
 MOVED_SHARE = 0.05  # of the input, or

@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
-from host.sysid.flight.free_response import with_free_response
-from host.sysid.flight.logged_inputs import logged_inputs
-from host.sysid.flight.overlapping_inputs import SUSTAINED, bounded, without_echoes
-from host.sysid.flight.sustained_inputs import sustained_inputs
+from host.sysid.maneuvers.free_response import with_free_response
+from host.sysid.maneuvers.logged_inputs import logged_inputs
+from host.sysid.maneuvers.overlapping_inputs import SUSTAINED, bounded, without_echoes
+from host.sysid.maneuvers.sustained_inputs import sustained_inputs
 
 LAG_S = 0.12  # a hand needs about this long for one edge
 LEAST_EDGE_RAD = 0.025  # 1.4 degrees: a pulse smaller than this excites nothing on a trainer

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.flight.maneuver_detection import STILL_RAD, DetectedManeuver
+from host.sysid.maneuvers.maneuver_detection import STILL_RAD, DetectedManeuver
 from host.sysid.numerics.state_feedback import feedback_law
 
 # Which way a hand that levels moves a surface.

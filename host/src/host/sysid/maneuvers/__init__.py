@@ -1,0 +1,1 @@
+"""Test points of a flight: found, graded, cut."""
