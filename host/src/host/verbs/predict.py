@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     from host.readers.autopilot_flight import chosen_sensors
     from host.readers.shipped_maps import LIST, map_lines
     from host.sysid.answer import OutputPaths, check_outputs
-    from host.sysid.flight.data_finding import check_lines
+    from host.sysid.checks.data_finding import check_lines
     from host.sysid.models.named_models import shipped_lines
     from host.sysid.pipeline import predict
     from host.sysid.pipeline.arguments import option_words

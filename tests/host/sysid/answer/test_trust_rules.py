@@ -7,8 +7,8 @@ import pytest
 from host.sysid.answer import CAREFUL, TRUSTED, answer_document, verdict_lines, verdict_of
 from host.sysid.answer.servo_lines import servo_document
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, driven_by_inputs
+from host.sysid.checks.data_finding import Finding
 from host.sysid.estimators.servo_parameters import SERVO, ServoEstimate, ServoNumber
-from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.prediction_limits import Prediction
 from host.sysid.models import Trim, template

@@ -5,7 +5,7 @@ import pytest
 from host.aircraft.mass_properties import airframe_data
 from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
-from host.sysid.flight.agreement_findings import calibration_findings
+from host.sysid.checks.agreement_findings import calibration_findings
 from host.sysid.reconstruction.calibration_consistency import (
     OBSERVABLE_GROUPS,
     SIGNIFICANCE,

@@ -28,8 +28,8 @@ from host.instrument.error_sources import AIRCRAFT_FILE, TYPE
 from host.sysid.answer import trust_rules
 from host.sysid.answer.coefficient_rules import input_feedback, open_finding
 from host.sysid.answer.feedback_pairs import feedback_of
+from host.sysid.checks.data_finding import finding_document, open_channels
 from host.sysid.coefficients import CoefficientFit
-from host.sysid.flight.data_finding import finding_document, open_channels
 from host.sysid.pipeline import Identification, identify
 from host.sysid.reconstruction.sensor_dynamics import SERVO_DELAY
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from host.sysid.answer.doubt import Doubt, doubt
 from host.sysid.answer.impossible_signs import impossible_signs
 from host.sysid.answer.trust_rules import percent
+from host.sysid.checks.data_finding import Feedback
 from host.sysid.coefficients.coefficient_model import standard_model
-from host.sysid.flight.data_finding import Feedback
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer

@@ -18,9 +18,9 @@ from host.sysid.answer.marks import (
     first_lines,
     share_text,
 )
+from host.sysid.checks.data_finding import Feedback
 from host.sysid.coefficients.coefficient_fit import FLAG_SHARE
 from host.sysid.coefficients.coefficient_model import standard_model
-from host.sysid.flight.data_finding import Feedback
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer

@@ -21,7 +21,7 @@ from host.sysid.answer.feedback_pairs import alike_derivatives, feedback_of
 from host.sysid.answer.impossible_signs import impossible_signs
 from host.sysid.answer.method_agreement import disagreements
 from host.sysid.answer.parameter_places import leaning_on
-from host.sysid.flight.data_finding import Finding, open_channels
+from host.sysid.checks.data_finding import Finding, open_channels
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.prediction_limits import FAILS, Prediction
 from host.sysid.flight.systematic_errors import is_template, scaled_by_airspeed

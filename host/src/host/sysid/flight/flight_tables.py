@@ -35,10 +35,10 @@ from host.readers.foreign_tables import (
 )
 from host.readers.original_table import is_original, original_table
 from host.readers.recorded import commanded_by_map, recording_of_log, recording_of_table
-from host.sysid.flight.data_finding import Finding
-from host.sysid.flight.finding_consequences import checked
-from host.sysid.flight.measured import Measured, measured
-from host.sysid.flight.unit_sign_checks import SURFACES
+from host.sysid.checks.data_finding import Finding
+from host.sysid.checks.finding_consequences import checked
+from host.sysid.checks.measured import Measured, measured
+from host.sysid.checks.unit_sign_checks import SURFACES
 from host.sysid.maneuvers.logged_inputs import input_columns
 from host.terminal import command_line
 

@@ -10,6 +10,7 @@ import numpy as np
 from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, deviations, unknown_sensors
 from host.physical.recording import OWN
+from host.sysid.checks.hidden_angles import without_vanes
 from host.sysid.estimators.method_registry import find_method
 from host.sysid.estimators.start_values import regression_estimates
 from host.sysid.flight.filter_step import (
@@ -17,7 +18,6 @@ from host.sysid.flight.filter_step import (
     no_filter_step,
     rolling_gust_identifiable,
 )
-from host.sysid.flight.hidden_angles import without_vanes
 from host.sysid.flight.reconstructed_flight import FlownManeuver
 from host.sysid.models.rate_forces import with_rate_forces
 from host.sysid.models.residual_delays import (

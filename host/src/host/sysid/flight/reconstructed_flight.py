@@ -21,7 +21,7 @@ from host.instrument.servo_prior import ServoPrior
 from host.near_names import like
 from host.physical.recording import OWN, SURFACES
 from host.readers.column_sampling import sampled_name
-from host.sysid.flight.data_finding import Finding
+from host.sysid.checks.data_finding import Finding
 from host.sysid.flight.input_kinks import with_means_of_motion
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models.maneuver import Maneuver

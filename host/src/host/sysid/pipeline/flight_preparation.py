@@ -12,13 +12,13 @@ from host.instrument.deviations import unknown_sensors
 from host.instrument.error_labels import recording_notes
 from host.instrument.servo_prior import servo_prior
 from host.physical.calibration import load_calibration
-from host.sysid.flight.agreement_findings import calibration_findings, disagreement
-from host.sysid.flight.airspeed_scale import airspeed_scale_findings
-from host.sysid.flight.data_finding import Finding
-from host.sysid.flight.feedback_findings import feedback_findings
-from host.sysid.flight.hidden_angles import no_instrument_errors_finding, no_vanes_finding
+from host.sysid.checks.agreement_findings import calibration_findings, disagreement
+from host.sysid.checks.airspeed_scale import airspeed_scale_findings
+from host.sysid.checks.data_finding import Finding
+from host.sysid.checks.feedback_findings import feedback_findings
+from host.sysid.checks.hidden_angles import no_instrument_errors_finding, no_vanes_finding
+from host.sysid.checks.small_inputs import whole_flight
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight, reconstruct_flight
-from host.sysid.flight.small_inputs import whole_flight
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.maneuvers.maneuver_selection import overlap_notes, select_maneuvers
 from host.sysid.pipeline.flight_at_hand import FlightAtHand

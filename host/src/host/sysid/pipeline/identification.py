@@ -19,8 +19,8 @@ from host.sysid.answer.short_answer import MOST_LINES, REST, mode_summary, short
 from host.sysid.answer.trust_rules import Evidence
 from host.sysid.answer.truth_comparison import truth_document, truth_report_lines
 from host.sysid.answer.verdict import removed_error_lines, verdict_lines
+from host.sysid.checks.data_finding import Finding, finding_document
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
-from host.sysid.flight.data_finding import Finding, finding_document
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.pipeline.arguments import chosen_stretches, numbers_of, path_of

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from host.sysid.flight.data_finding import accepted_checks
+from host.sysid.checks.data_finding import accepted_checks
 from host.sysid.maneuvers.maneuver_selection import TimeSpan
 from host.sysid.pipeline.arguments import chosen_stretches, listed, numbers_of, of_each_flight
 

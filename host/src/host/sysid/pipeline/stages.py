@@ -12,9 +12,9 @@ from host.aircraft.prior.prior_table import PriorTable
 from host.errors import IdentificationError
 from host.progress import stage
 from host.sysid.answer.truth_comparison import read_truth
+from host.sysid.checks.data_finding import accepted_in_vain
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, CoefficientEstimator
 from host.sysid.estimators.method_options import check_options, options_of
-from host.sysid.flight.data_finding import accepted_in_vain
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import LinearEstimator

@@ -13,9 +13,9 @@ from host.sysid.answer import CAREFUL, TRUSTED, verdict_of
 from host.sysid.answer.coefficient_rules import input_feedback
 from host.sysid.answer.feedback_pairs import alike_derivatives, combined_derivatives
 from host.sysid.answer.trust_rules import Evidence
+from host.sysid.checks.data_finding import Feedback, Finding
+from host.sysid.checks.feedback_findings import feedback_findings
 from host.sysid.coefficients import CoefficientAnswer
-from host.sysid.flight.data_finding import Feedback, Finding
-from host.sysid.flight.feedback_findings import feedback_findings
 from host.sysid.flight.flight_tables import read_flight_columns
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.maneuvers.maneuver_detection import detect_maneuvers

@@ -6,9 +6,9 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from host.arrays import Array
-from host.sysid.flight.data_finding import Finding
-from host.sysid.flight.unit_readings import reread
-from host.sysid.flight.unit_sign_checks import check
+from host.sysid.checks.data_finding import Finding
+from host.sysid.checks.unit_readings import reread
+from host.sysid.checks.unit_sign_checks import check
 
 MOST_READINGS = 4  # a map with more wrong lines is no map
 # Without these columns everything can still be fitted.

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.flight.identity_factors import correlation
+from host.sysid.checks.identity_factors import correlation
 
 USUAL_SHARE, SPREAD = 0.1, 0.7  # of lift; of its logarithm, one deviation
 LEAST_CORRELATION = 0.5  # of a force with its angle: with less the angle is not what makes it

@@ -17,16 +17,16 @@ import numpy as np
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel, airspeed_share
 from host.readers.named_channels import STANDARD_DENSITY_KGPM3
-from host.sysid.flight.data_finding import Finding
-from host.sysid.flight.driven_motion import (
+from host.sysid.checks.data_finding import Finding
+from host.sysid.checks.driven_motion import (
     SENSOR_DELAY_S,
     DrivenTest,
     SensorTolerances,
     testable,
 )
-from host.sysid.flight.identity_factors import Identity
-from host.sysid.flight.kinematic_checks import OVER_AIRSPEED, identities
-from host.sysid.flight.unit_sign_checks import airborne
+from host.sysid.checks.identity_factors import Identity
+from host.sysid.checks.kinematic_checks import OVER_AIRSPEED, identities
+from host.sysid.checks.unit_sign_checks import airborne
 
 CHECK = "airspeed-scale"
 # Of vane and IMU, and what their models leave of the motion: with none of it the twin's right

@@ -17,11 +17,11 @@ import numpy as np
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2, RAD_PER_DEG
 from host.readers.column_map import UNITS
-from host.sysid.flight.data_finding import Finding
-from host.sysid.flight.driven_motion import CERTAIN
-from host.sysid.flight.identity_factors import FACTOR_CORRELATION
-from host.sysid.flight.kinematic_checks import CHECK_OF, misfit, related
-from host.sysid.flight.unit_sign_checks import SURFACES, airborne, check
+from host.sysid.checks.data_finding import Finding
+from host.sysid.checks.driven_motion import CERTAIN
+from host.sysid.checks.identity_factors import FACTOR_CORRELATION
+from host.sysid.checks.kinematic_checks import CHECK_OF, misfit, related
+from host.sysid.checks.unit_sign_checks import SURFACES, airborne, check
 
 ANGLES = ("alpha_rad", "beta_rad", "phi_rad", "theta_rad", "psi_rad")
 RATES = ("p_radps", "q_radps", "r_radps")

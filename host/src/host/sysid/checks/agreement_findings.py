@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from host.sysid.flight.data_finding import Finding
+from host.sysid.checks.data_finding import Finding
 from host.sysid.reconstruction.calibration_consistency import (
     ALL,
     calibration_lines,

@@ -8,7 +8,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.constants import DEG_PER_RAD
-from host.sysid.flight.data_finding import Finding
+from host.sysid.checks.data_finding import Finding
 from host.sysid.maneuvers.maneuver_detection import FLYING_SHARE, STILL_RAD, DetectedManeuver
 from host.sysid.maneuvers.maneuver_selection import FEWEST, SURFACES, select_maneuvers
 

@@ -14,8 +14,8 @@ import numpy as np
 from host.arrays import Array
 from host.people_units import people_name
 from host.readers.column_sampling import FEWEST, Sampling, sampling_of
-from host.sysid.flight.data_finding import Finding
-from host.sysid.flight.stuck_sensors import stuck_runs
+from host.sysid.checks.data_finding import Finding
+from host.sysid.checks.stuck_sensors import stuck_runs
 from host.sysid.maneuvers.maneuver_detection import FLYING_SHARE
 
 SPIKE_RANGES = 100.0  # beyond the middle: of the range that 96 % of the values lie in

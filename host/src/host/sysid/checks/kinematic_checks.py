@@ -18,15 +18,15 @@ import numpy as np
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.readers.column_map import UNITS
-from host.sysid.flight.data_finding import AS_IT_IS, HINT, Finding
-from host.sysid.flight.driven_motion import (
+from host.sysid.checks.data_finding import AS_IT_IS, HINT, Finding
+from host.sysid.checks.driven_motion import (
     DrivenFactor,
     driven_factors,
     driven_misfit,
     likelier_factor,
     shared_factor,
 )
-from host.sysid.flight.identity_factors import (
+from host.sysid.checks.identity_factors import (
     FACTOR_CORRELATION,
     LARGEST_FACTOR,
     SIGN_CORRELATION,
@@ -36,7 +36,7 @@ from host.sysid.flight.identity_factors import (
     factors,
     without,
 )
-from host.sysid.flight.side_force import unlikely_factors
+from host.sysid.checks.side_force import unlikely_factors
 
 UNIT_MARGIN = 1.1  # about the range of factors: a unit's outside it is none
 MOTION_SHARE = 0.3  # of what a law leaves: with less it is noise

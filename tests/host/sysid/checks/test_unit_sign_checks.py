@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from host.cli import main
 from host.readers.column_map import UNITS
-from host.sysid.flight.data_finding import CHECKS, Finding, open_channels
-from host.sysid.flight.finding_consequences import checked
+from host.sysid.checks.data_finding import CHECKS, Finding, open_channels
+from host.sysid.checks.finding_consequences import checked
+from host.sysid.checks.unit_sign_checks import SURFACES, check
 from host.sysid.flight.flight_tables import read_columns
-from host.sysid.flight.unit_sign_checks import SURFACES, check
 from studies.foreign.flight import Air, fly
 
 Columns = dict[str, np.ndarray]

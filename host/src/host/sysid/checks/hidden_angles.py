@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from host.errors import IdentificationError
 from host.sysid.aerodynamics.unmeasured_motion import ACCELEROMETER_OF
-from host.sysid.flight.data_finding import Finding
+from host.sysid.checks.data_finding import Finding
 from host.sysid.models.state_space_model import LinearModel, without_outputs
 
 WORDS = {"alpha_rad": "the angle of attack", "beta_rad": "the sideslip"}

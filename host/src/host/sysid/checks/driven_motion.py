@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from host.arrays import Array
-from host.sysid.flight.identity_factors import LARGEST_FACTOR, Identity
+from host.sysid.checks.identity_factors import LARGEST_FACTOR, Identity
 from host.sysid.numerics.first_order_filter import first_order_filter
 
 PAST_STEPS = 6  # of what is left, that tell the next

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from host.arrays import Array, IntArray
-from host.sysid.flight.data_finding import Feedback, Finding
+from host.sysid.checks.data_finding import Feedback, Finding
 from host.sysid.maneuvers.maneuver_detection import LEAD_S, STILL_RAD, DetectedManeuver, runs_of
 from host.sysid.maneuvers.maneuver_selection import FEWEST
 from host.sysid.numerics.feedback_fast import fast_feedback

@@ -10,7 +10,7 @@ from host.instrument.deviations import SensorErrorModel, unknown_sensors
 from host.physical.calibration import load_calibration
 from host.physical.recording import FOREIGN, Recording
 from host.sysid.answer import TRUSTED, verdict_of
-from host.sysid.flight.airspeed_scale import (
+from host.sysid.checks.airspeed_scale import (
     CERTAIN,
     CHECK,
     airspeed_scale,
