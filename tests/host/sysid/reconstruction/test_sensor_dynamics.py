@@ -9,10 +9,10 @@ from host.instrument.deviations import sensor_error_model
 from host.instrument.error_labels import ERROR_LABELS
 from host.physical.recording import AUTOPILOT, FOREIGN, Recording
 from host.sysid import Maneuver
+from host.sysid.errors.systematic_errors import systematic_error_shifts
 from host.sysid.estimators.filter_error_gust import fit_with_gust
 from host.sysid.estimators.gust_model import gust_model
 from host.sysid.estimators.gust_penetration import with_gust_penetration
-from host.sysid.flight.systematic_errors import systematic_error_shifts
 from host.sysid.models import FitResult, LinearModel, Trim, template
 from host.sysid.reconstruction.path_preparation import compensate_lowpass
 from host.sysid.reconstruction.reconstruction import Compatibility, SensorErrorEstimate

@@ -13,9 +13,9 @@ from dataclasses import replace
 
 from host.arrays import Array
 from host.errors import IdentificationError
+from host.sysid.errors.trim_departure import Departure
 from host.sysid.estimators.method_registry import fit
 from host.sysid.flight.reconstructed_flight import FlownManeuver
-from host.sysid.flight.trim_departure import Departure
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel

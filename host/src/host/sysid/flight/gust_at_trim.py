@@ -8,9 +8,9 @@ from dataclasses import replace
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.sysid.aerodynamics.thrust_terms import beside_thrust, thrust_terms
+from host.sysid.errors.trim_departure import correct_trim_departure, without_further_inputs
 from host.sysid.estimators.filter_error_gust import GustFit, fit_with_gust
 from host.sysid.estimators.gust_delays import advance_outputs
-from host.sysid.flight.trim_departure import correct_trim_departure, without_further_inputs
 from host.sysid.models.fit_result import without_parameters
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, without_inputs

@@ -17,6 +17,7 @@ from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.aerodynamics.left_out_terms import LEFT_OUT_TERMS, NEEDED
 from host.sysid.aerodynamics.thrust_terms import thrust_terms
+from host.sysid.errors.trim_departure import Departure, correct_trim_departure
 from host.sysid.estimators.filter_error_gust import fit_with_gust
 from host.sysid.estimators.gust_delays import CALM_MPS, advance_outputs
 from host.sysid.estimators.gust_model import gust_deviation_mps
@@ -24,7 +25,6 @@ from host.sysid.estimators.gust_penetration import penetration_of
 from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.noise_model_comparison import DECISIVE, bayes_criterion
 from host.sysid.estimators.users_model import GUST, no_filter, no_gust_state
-from host.sysid.flight.trim_departure import Departure, correct_trim_departure
 from host.sysid.models.fit_result import FitResult, without_parameters
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel

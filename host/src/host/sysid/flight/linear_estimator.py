@@ -18,6 +18,21 @@ from host.sysid.aerodynamics.coefficient_table import (
     trim_of,
 )
 from host.sysid.aerodynamics.thrust_terms import THRUST_BESIDE, with_thrust
+from host.sysid.errors.surface_motion import (
+    HELD,
+    HELD_SURFACES,
+    LINES,
+    SERVOS,
+    between_samples,
+    with_moving_surfaces,
+)
+from host.sysid.errors.trim_departure import (
+    NO_SPIN,
+    Departure,
+    correct_trim_departure,
+    spin_of,
+)
+from host.sysid.errors.widest_errors import widest_errors
 from host.sysid.estimators.filter_error_gust import without_gust_parameters
 from host.sysid.estimators.gust_model import VANES
 from host.sysid.estimators.gust_penetration import without_gust_penetration
@@ -47,21 +62,6 @@ from host.sysid.flight.reconstructed_flight import (
     FlownManeuver,
     ReconstructedFlight,
 )
-from host.sysid.flight.surface_motion import (
-    HELD,
-    HELD_SURFACES,
-    LINES,
-    SERVOS,
-    between_samples,
-    with_moving_surfaces,
-)
-from host.sysid.flight.trim_departure import (
-    NO_SPIN,
-    Departure,
-    correct_trim_departure,
-    spin_of,
-)
-from host.sysid.flight.widest_errors import widest_errors
 from host.sysid.maneuvers.maneuver_selection import excited_axes
 from host.sysid.models.diagnostics import (
     assess_identifiability,

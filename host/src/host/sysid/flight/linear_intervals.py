@@ -17,22 +17,22 @@ from host.sysid.aerodynamics.coefficient_table import (
     coefficient_parts,
 )
 from host.sysid.aerodynamics.path_thrust import path_thrust
-from host.sysid.estimators.coherence_inflation import inflate_by_coherence, widened_to
-from host.sysid.estimators.gust_penetration import with_unknown_roll_lag
-from host.sysid.estimators.missing_control import missing_control, widened_by_missing_control
-from host.sysid.flight.airspeed_tolerance import airspeed_shift
-from host.sysid.flight.column_noise import with_column_noise
-from host.sysid.flight.filter_step import others_recorded
-from host.sysid.flight.free_simulation import FreeResponses, free_responses
-from host.sysid.flight.linear_stages import LinearEstimate, LinearIntervals
-from host.sysid.flight.noise_model_limits import excess_over_noise_model
-from host.sysid.flight.sampling_error import hold_shift
-from host.sysid.flight.surface_motion import kink_residuals, motion_shift, surfaces_known
-from host.sysid.flight.systematic_errors import (
+from host.sysid.errors.airspeed_tolerance import airspeed_shift
+from host.sysid.errors.column_noise import with_column_noise
+from host.sysid.errors.sampling_error import hold_shift
+from host.sysid.errors.surface_motion import kink_residuals, motion_shift, surfaces_known
+from host.sysid.errors.systematic_errors import (
     add_systematic_covariance,
     systematic_error_shifts,
     systematic_residuals,
 )
+from host.sysid.estimators.coherence_inflation import inflate_by_coherence, widened_to
+from host.sysid.estimators.gust_penetration import with_unknown_roll_lag
+from host.sysid.estimators.missing_control import missing_control, widened_by_missing_control
+from host.sysid.flight.filter_step import others_recorded
+from host.sysid.flight.free_simulation import FreeResponses, free_responses
+from host.sysid.flight.linear_stages import LinearEstimate, LinearIntervals
+from host.sysid.flight.noise_model_limits import excess_over_noise_model
 from host.sysid.maneuvers.pilot_takeover import taken_over
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from host.aircraft.mass_properties import Condition
 from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import CoefficientParts, ShiftedEstimate
+from host.sysid.errors.trim_departure import Departure
 from host.sysid.estimators.servo_parameters import ServoEstimate
 from host.sysid.flight.prediction_limits import Prediction
 from host.sysid.flight.reconstructed_flight import FlownManeuver
-from host.sysid.flight.trim_departure import Departure
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver

@@ -42,8 +42,8 @@ from host.sysid.aerodynamics.path_thrust import rotor_means
 from host.sysid.aerodynamics.thrust_terms import thrust_terms
 from host.sysid.aerodynamics.unmeasured_motion import with_unmeasured
 from host.sysid.aerodynamics.varying_airspeed import MEASURED, SECOND_ORDER_TERMS, VaryingModel
+from host.sysid.errors.one_step import CERTAIN_SD, HALF_WAY, OneStep, one_step_of
 from host.sysid.estimators.gust_model import gust_deviation_mps
-from host.sysid.flight.one_step import CERTAIN_SD, HALF_WAY, OneStep, one_step_of
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver

@@ -15,8 +15,8 @@ from dataclasses import replace
 import numpy as np
 
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
-from host.sysid.flight.one_step import one_step_of
-from host.sysid.flight.systematic_errors import is_template, retrimmed
+from host.sysid.errors.one_step import one_step_of
+from host.sysid.errors.systematic_errors import is_template, retrimmed
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.templates import Trim

@@ -20,7 +20,7 @@ from scipy import special
 from host.arrays import Array
 from host.constants import NORMAL_95
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
-from host.sysid.flight.one_step import OneStep, Step, one_step_of
+from host.sysid.errors.one_step import OneStep, Step, one_step_of
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel

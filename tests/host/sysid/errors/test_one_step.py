@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from host.sysid.errors.one_step import one_step_of
 from host.sysid.estimators import fit
-from host.sysid.flight.one_step import one_step_of
 from host.sysid.models import LinearModel, Maneuver, Parameter, Term, Trim, template
 from host.sysid.numerics.output_error_problem import OutputProblem
 

@@ -14,12 +14,12 @@ from host.instrument.deviations import unknown_sensors
 from host.readers.even_grid import even_columns
 from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
 from host.sysid.answer import true_coefficients
+from host.sysid.errors.trim_departure import spin_of
 from host.sysid.estimators import fit
 from host.sysid.estimators.start_values import regression_estimates, start_values
 from host.sysid.flight import gust_at_trim, linear_estimator
 from host.sysid.flight.linear_model import imu_place_m, without_attitude
 from host.sysid.flight.reconstructed_flight import flown_maneuvers, reconstruct_flight
-from host.sysid.flight.trim_departure import spin_of
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models import FitResult, Trim, template
 from host.sysid.models.residual_delays import STANDARD_DELAYS

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from host.sysid.flight.one_step import one_step_of
+from host.sysid.errors.one_step import one_step_of
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver

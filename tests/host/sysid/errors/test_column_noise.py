@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from host.sysid.errors.column_noise import with_column_noise
 from host.sysid.estimators import fit
-from host.sysid.flight.column_noise import with_column_noise
 from host.sysid.models import Maneuver, Trim, equations_from
 
 DT_S, SAMPLES, GYRO, ATTITUDE = 0.04, 100, 0.05, 0.002

@@ -16,8 +16,8 @@ import numpy as np
 from host.aircraft.mass_properties import Condition
 from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate, trim_of
+from host.sysid.errors.one_step import one_step_of
 from host.sysid.estimators.gust_penetration import penetration_of, without_gust_penetration
-from host.sysid.flight.one_step import one_step_of
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver

@@ -20,11 +20,11 @@ from host.arrays import Array
 from host.constants import NORMAL_95
 from host.errors import IdentificationError
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
+from host.sysid.errors.one_step import CERTAIN_SD, HALF_WAY, one_step_of
+from host.sysid.errors.sampling_error import HOLD
 from host.sysid.estimators.method_registry import fit
 from host.sysid.flight.filter_step import others_recorded
-from host.sysid.flight.one_step import CERTAIN_SD, HALF_WAY, one_step_of
 from host.sysid.flight.reconstructed_flight import FlownManeuver
-from host.sysid.flight.sampling_error import HOLD
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel

@@ -1,0 +1,1 @@
+"""What errors of instrument, sampling and trim leave open in an estimate."""
