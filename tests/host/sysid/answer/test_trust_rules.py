@@ -10,8 +10,8 @@ from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, driven_by_input
 from host.sysid.checks.data_finding import Finding
 from host.sysid.estimators.servo_parameters import SERVO, ServoEstimate, ServoNumber
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.prediction_limits import Prediction
 from host.sysid.models import Trim, template
+from host.sysid.validation.prediction_limits import Prediction
 from studies.wrong_flights import LinearFlight, fly
 
 from tests.host.sysid.at_hand import identify

@@ -24,9 +24,9 @@ from host.sysid.answer.parameter_places import leaning_on
 from host.sysid.checks.data_finding import Finding, open_channels
 from host.sysid.errors.systematic_errors import is_template, scaled_by_airspeed
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.prediction_limits import FAILS, Prediction
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.residual_delays import STANDARD_DELAYS
+from host.sysid.validation.prediction_limits import FAILS, Prediction
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer

@@ -14,7 +14,6 @@ from host.sysid.aerodynamics.coefficient_table import (
     CoefficientTable,
 )
 from host.sysid.estimators.servo_parameters import ServoEstimate
-from host.sysid.flight.prediction_limits import Prediction
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models.diagnostics import (
     Collinearity,
@@ -30,6 +29,7 @@ from host.sysid.models.templates import Trim
 from host.sysid.models.thrust_column import ThrustColumn
 from host.sysid.numerics.input_coherence import InputCoherence
 from host.sysid.reconstruction.sensor_corrections import Correction
+from host.sysid.validation.prediction_limits import Prediction
 
 
 @dataclass(frozen=True)

@@ -30,9 +30,7 @@ from host.sysid.estimators.coherence_inflation import inflate_by_coherence, wide
 from host.sysid.estimators.gust_penetration import with_unknown_roll_lag
 from host.sysid.estimators.missing_control import missing_control, widened_by_missing_control
 from host.sysid.flight.filter_step import others_recorded
-from host.sysid.flight.free_simulation import FreeResponses, free_responses
 from host.sysid.flight.linear_stages import LinearEstimate, LinearIntervals
-from host.sysid.flight.noise_model_limits import excess_over_noise_model
 from host.sysid.maneuvers.pilot_takeover import taken_over
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
@@ -41,6 +39,8 @@ from host.sysid.numerics.maneuver_agreement import inflate_covariance, maneuver_
 from host.sysid.numerics.score_variance import white_fit_variance
 from host.sysid.reconstruction.reconstruction import Compatibility
 from host.sysid.reconstruction.sensor_dynamics import DELAYED_COLUMNS, IMU_DELAY, SERVO_DELAY
+from host.sysid.validation.free_simulation import FreeResponses, free_responses
+from host.sysid.validation.noise_model_limits import excess_over_noise_model
 
 LEAST_COMMANDED = 0.25  # of all samples, in maneuvers that a test input made
 WHITE = "output error (white)"  # its noise is judged beside what the inputs drive

@@ -10,7 +10,6 @@ from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import CoefficientParts, ShiftedEstimate
 from host.sysid.errors.trim_departure import Departure
 from host.sysid.estimators.servo_parameters import ServoEstimate
-from host.sysid.flight.prediction_limits import Prediction
 from host.sysid.flight.reconstructed_flight import FlownManeuver
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.fit_result import FitResult
@@ -18,6 +17,7 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
 from host.sysid.numerics.input_coherence import InputCoherence
+from host.sysid.validation.prediction_limits import Prediction
 
 
 @dataclass(frozen=True)

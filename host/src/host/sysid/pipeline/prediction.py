@@ -13,7 +13,6 @@ from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.aerodynamics.thrust_terms import with_thrust
 from host.sysid.answer.json_document import json_text
-from host.sysid.flight.free_simulation import frozen_at
 from host.sysid.models.equation_file import KIND as EQUATIONS
 from host.sysid.models.model_file import read_model
 from host.sysid.models.named_models import model_path
@@ -36,6 +35,7 @@ from host.sysid.pipeline.notebook_pictures import Pictures
 from host.sysid.pipeline.prediction_text import simulation_document, simulation_lines
 from host.sysid.pipeline.reading_options import OfEach, joined_stretches, reading_options
 from host.sysid.pipeline.simulation import Simulation, simulate
+from host.sysid.validation.free_simulation import frozen_at
 
 THRUST_HELD = "the model was fitted with thrust that changed; none is measured here: taken as held"
 

@@ -13,10 +13,8 @@ from host.errors import IdentificationError
 from host.sysid.answer.figure_kinds import Trace, histories
 from host.sysid.answer.mat_file import labels
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
-from host.sysid.flight.free_simulation import FreeRun, fits_of, free_runs, frozen_model
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight, flown_maneuvers
-from host.sysid.flight.window_prediction import WINDOWS_S, WindowErrors, window_errors
 from host.sysid.maneuvers.maneuver_selection import excited_axes, merge_overlapping
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.maneuver import Maneuver
@@ -24,6 +22,8 @@ from host.sysid.models.state_space_model import CONSTANT, LinearModel
 from host.sysid.models.theil_inequality import TheilInequality, theil_inequality
 from host.sysid.pipeline.notebook_html import answer_html
 from host.sysid.pipeline.notebook_pictures import Pictures
+from host.sysid.validation.free_simulation import FreeRun, fits_of, free_runs, frozen_model
+from host.sysid.validation.window_prediction import WINDOWS_S, WindowErrors, window_errors
 
 if TYPE_CHECKING:
     import pandas as pd

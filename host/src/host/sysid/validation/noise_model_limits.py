@@ -16,7 +16,6 @@ from host.arrays import Array, BoolArray
 from host.sysid.estimators.coherence_inflation import NoiseExcess
 from host.sysid.estimators.gust_model import driven_model
 from host.sysid.estimators.innovations import driven_states
-from host.sysid.flight.free_simulation import FreeResponses, weighted_fit
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
@@ -29,6 +28,7 @@ from host.sysid.numerics.input_coherence import (
 from host.sysid.numerics.output_error_problem import OutputProblem, Response
 from host.sysid.numerics.process_noise import air_states, discrete_noise, steady_covariance
 from host.sysid.numerics.score_variance import variance_ratio
+from host.sysid.validation.free_simulation import FreeResponses, weighted_fit
 
 SIGNIFICANCE = 0.01
 DRAWS, DRAW_SEED = 100, 2

@@ -10,7 +10,6 @@ import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.estimators.output_error_fit import fit_output_error
-from host.sysid.flight.window_prediction import Biases
 from host.sysid.maneuvers.maneuver_detection import LEAD_S
 from host.sysid.models.diagnostics import SignalFit, signal_fits
 from host.sysid.models.fit_result import FitResult
@@ -20,6 +19,7 @@ from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.nonlinear_problem import NonlinearProblem, output_problem
 from host.sysid.numerics.output_error_problem import OutputProblem, Response
+from host.sysid.validation.window_prediction import Biases
 
 CONSTANT_ROUNDS = 6  # steps to the constants of each record, where outputs bend in them
 # With the weights of the first guess alone az was told by offsets of 20 m/s2, and its residual was

@@ -8,13 +8,13 @@ import pytest
 from host.sysid.answer import verdict_of
 from host.sysid.answer.model_agreement import RELIED_ON
 from host.sysid.estimators import fit
-from host.sysid.flight.free_simulation import free_responses
 from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.noise_model_limits import random_errors
-from host.sysid.flight.prediction_limits import power_freedom, predictions, random_noise
 from host.sysid.models import LinearModel, Maneuver, model_from
 from host.sysid.numerics.ar_noise import ArNoise, autocovariance
 from host.sysid.numerics.input_coherence import input_coherence
+from host.sysid.validation.free_simulation import free_responses
+from host.sysid.validation.noise_model_limits import random_errors
+from host.sysid.validation.prediction_limits import power_freedom, predictions, random_noise
 from studies.independent import cells, flown
 from studies.wrong_flights import fly
 

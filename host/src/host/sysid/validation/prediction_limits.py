@@ -21,14 +21,6 @@ import numpy as np
 from host.arrays import Array
 from host.sysid.estimators.gust_model import driven_model
 from host.sysid.estimators.innovations import driven_states
-from host.sysid.flight.free_simulation import free_responses, weighted_fit
-from host.sysid.flight.noise_model_limits import (
-    DRAWS,
-    measured_means,
-    random_errors,
-    rarely_exceeded,
-    slopes_of_means,
-)
 from host.sysid.models.covariance_root import covariance_root
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.fit_result import FitResult
@@ -36,6 +28,14 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.ar_noise import ArNoise, autocovariance
 from host.sysid.numerics.input_coherence import InputCoherence, block_length, block_means
+from host.sysid.validation.free_simulation import free_responses, weighted_fit
+from host.sysid.validation.noise_model_limits import (
+    DRAWS,
+    measured_means,
+    random_errors,
+    rarely_exceeded,
+    slopes_of_means,
+)
 
 FAILS = 0.5  # NRMSE of an output: a quarter of its variance is not explained
 DRAW_SEED = 1

@@ -1,0 +1,1 @@
+"""Unseen data predicted: how far a right model may miss."""
