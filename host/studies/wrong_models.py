@@ -19,7 +19,7 @@ from host.compiled import prefer_machine_code
 from host.errors import IdentificationError
 from host.physical.recording import FOREIGN, Recording
 from host.sysid.answer import CAREFUL, TRUSTED, verdict_of
-from host.sysid.flight.linear_answer import Answer
+from host.sysid.linear.linear_answer import Answer
 from host.sysid.models import Maneuver
 from host.sysid.numerics.input_coherence import input_coherence
 from host.sysid.numerics.output_error import minimise

@@ -128,7 +128,7 @@ def first_answers(folder: Path) -> bool:
 
 def imports_s() -> float:
     """Return the processor seconds that Python and the imports of the verb take alone."""
-    code = "import host.sysid.flight.linear_estimator, host.sysid.answer.verdict, host.log"
+    code = "import host.sysid.linear.linear_estimator, host.sysid.answer.verdict, host.log"
     code += ", host.sysid.flight.flight_tables, host.sysid.reconstruction.reconstruction"
     code += ", host.aircraft.mass_properties"
     before = os.times()

@@ -77,6 +77,8 @@ PROGRAMS = {"__init__", "__main__", "cli", "virtual"}
 HOST_NEVERS = (
     ("host.sysid", "host.twin"),
     ("host.twin.sensors", "host.twin.testcard"),
+    ("host.sysid.linear", "host.sysid.coefficients"),
+    ("host.sysid.coefficients", "host.sysid.linear"),
 )
 
 # Constants of physics and geometry with one owner, and how near to one a number is that means it.
@@ -447,7 +449,7 @@ PLANTED = [
     (floor_breaches, "host/src/host/twin/flight/fly.py", 'import_module("host.sysid.models")'),
     (
         floor_breaches,
-        "host/src/host/sysid/flight/linear_estimator.py",
+        "host/src/host/sysid/linear/linear_estimator.py",
         "from host.planning import card_planning",
     ),
     (floor_breaches, "host/src/host/errors.py", "from host.aircraft.file import AircraftError"),
@@ -474,7 +476,7 @@ PLANTED = [
     ),
     (
         import_breaches,
-        "host/src/host/sysid/flight/linear_estimator.py",
+        "host/src/host/sysid/linear/linear_estimator.py",
         "from studies import linear",
     ),
     (import_breaches, "host/studies/linear.py", "from tests.host import logs"),
@@ -530,7 +532,7 @@ ALLOWED = [
     ("firmware/boards/arduimu/clock.cpp", '#include "boards/avr/awake.h"'),
     ("tests/firmware/test_a/test_a.cpp", 'TEST_CASE("INFO") { CHECK_EQ(1, 1); REQUIRE(true); }'),
     (
-        "host/src/host/sysid/flight/linear_estimator.py",
+        "host/src/host/sysid/linear/linear_estimator.py",
         "from host.sysid.models.state_space_model import Term",
     ),
     ("host/src/host/decode.py", "import numpy\nfrom host.wire.schema import load"),

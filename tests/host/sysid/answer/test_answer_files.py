@@ -16,7 +16,7 @@ from host.sysid.answer import OutputPaths, check_outputs
 from host.sysid.answer.mat_file import labels, write_answers
 from host.sysid.answer.simulator_forms import write_form
 from host.sysid.flight.flight_tables import read_columns
-from host.sysid.flight.linear_answer import Answer
+from host.sysid.linear.linear_answer import Answer
 from scipy import io
 
 from tests.host.sysid.at_hand import identify

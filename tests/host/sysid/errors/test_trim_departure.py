@@ -17,9 +17,9 @@ from host.sysid.answer import true_coefficients
 from host.sysid.errors.trim_departure import spin_of
 from host.sysid.estimators import fit
 from host.sysid.estimators.start_values import regression_estimates, start_values
-from host.sysid.flight import gust_at_trim, linear_estimator
-from host.sysid.flight.linear_model import imu_place_m, without_attitude
 from host.sysid.flight.reconstructed_flight import flown_maneuvers, reconstruct_flight
+from host.sysid.linear import gust_at_trim, linear_estimator
+from host.sysid.linear.linear_model import imu_place_m, without_attitude
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models import FitResult, Trim, template
 from host.sysid.models.residual_delays import STANDARD_DELAYS

@@ -6,8 +6,8 @@ from host.instrument.deviations import sensor_error_model
 from host.physical.recording import AUTOPILOT, FOREIGN, OWN
 from host.readers.column_sampling import sampled_name
 from host.sysid.flight.filter_step import with_filter_step
-from host.sysid.flight.linear_model import model_and_method
 from host.sysid.flight.reconstructed_flight import FlownManeuver, ReconstructedFlight
+from host.sysid.linear.linear_model import model_and_method
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models import Trim, template
 from host.sysid.reconstruction.reconstruction import Compatibility

@@ -17,8 +17,8 @@ from host.errors import HostError
 from host.sysid.answer import MARKS, OutputPaths, read_truth, true_coefficients
 from host.sysid.answer.answer_figures import draw_coefficients
 from host.sysid.coefficients import standard_model
-from host.sysid.flight import maneuver_detection, maneuver_selection
-from host.sysid.flight.linear_estimator import LinearEstimator
+from host.sysid.linear.linear_estimator import LinearEstimator
+from host.sysid.maneuvers import maneuver_detection, maneuver_selection
 from host.sysid.models import Trim, template
 from host.sysid.pipeline import Identification, ReadingOptions, prepare, read_flight
 from host.sysid.pipeline.notebook_pictures import Pictures

@@ -24,7 +24,7 @@ from host.sysid.answer.figure_kinds import (
 from host.sysid.answer.linear_verdict import not_relied_on
 from host.sysid.answer.mat_file import labels
 from host.sysid.answer.truth_comparison import true_coefficients, true_poles
-from host.sysid.flight.linear_answer import Answer
+from host.sysid.linear.linear_answer import Answer
 from host.sysid.models.diagnostics import reference_values
 from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.parameter_units import parameter_unit

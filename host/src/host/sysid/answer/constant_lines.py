@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from host.people_units import people_name
-from host.sysid.flight.linear_answer import Answer
+from host.sysid.linear.linear_answer import Answer
 from host.sysid.models.model_constants import known_constants
 from host.sysid.models.parameter_units import parameter_unit
 

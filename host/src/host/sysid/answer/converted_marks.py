@@ -16,7 +16,7 @@ from host.sysid.answer.marks import (
     TRUSTED,
     UNSURE,
 )
-from host.sysid.flight.linear_answer import Answer
+from host.sysid.linear.linear_answer import Answer
 
 
 def converted_marks(answer: Answer, marks: Mapping[str, str]) -> dict[str, str]:

@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-from host.sysid.flight.linear_answer import Answer
+from host.sysid.linear.linear_answer import Answer
 
 MIXED = 0.98  # correlation of two inputs
 

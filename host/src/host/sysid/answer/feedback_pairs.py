@@ -9,7 +9,7 @@ import numpy as np
 from host.constants import NORMAL_95
 from host.sysid.answer.marks import FAIR
 from host.sysid.checks.data_finding import Feedback, Finding
-from host.sysid.flight.linear_answer import Answer
+from host.sysid.linear.linear_answer import Answer
 from host.sysid.models.state_space_model import LinearModel
 
 

@@ -16,8 +16,8 @@ from host.sysid.answer.settling_history import settling_document
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, unpredicted_states
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.coefficients.coefficient_fit import METHOD
-from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.reconstructed_flight import maneuver_name
+from host.sysid.linear.linear_answer import Answer
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver, Grade
 from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.model_constants import known_constants

@@ -25,7 +25,7 @@ from host.sysid.answer.servo_lines import servo_lines
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, doubts_of, unpredicted
 from host.sysid.errors.surface_motion import HELD_SURFACES
 from host.sysid.estimators.users_model import NOISE_CHOSEN
-from host.sysid.flight.linear_answer import Answer
+from host.sysid.linear.linear_answer import Answer
 from host.sysid.models.diagnostics import NOT_IDENTIFIABLE, reference_values
 
 PLACE = "imu_"  # begins the name of a sensor's place: no property of the aircraft

@@ -11,7 +11,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.export.mat_writer import cells, mat_name, write_mat
-from host.sysid.flight.linear_answer import Answer
+from host.sysid.linear.linear_answer import Answer
 from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.parameter_units import parameter_unit
 from host.sysid.reconstruction.inverse_sensor_model import FIT_RATE_HZ

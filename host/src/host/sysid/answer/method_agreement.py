@@ -17,7 +17,7 @@ import numpy as np
 from scipy import special
 
 from host.sysid.estimators.method_registry import find_method
-from host.sysid.flight.linear_answer import Answer
+from host.sysid.linear.linear_answer import Answer
 
 SIGNIFICANCE = 0.01
 LEAST_SHARE = 0.1

@@ -14,7 +14,7 @@ import numpy as np
 
 from host.sysid.answer.doubt import Doubt
 from host.sysid.answer.marks import CAREFUL, TRUSTED
-from host.sysid.flight.linear_answer import Answer
+from host.sysid.linear.linear_answer import Answer
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer

@@ -17,7 +17,7 @@ from host.sysid.answer.mat_file import labels, write_answers
 from host.sysid.answer.settling_history import has_history, write_history
 from host.sysid.answer.simulator_forms import CONTROL, FORMS, files_of, form_of, write_form
 from host.sysid.estimators.method_registry import all_methods
-from host.sysid.flight.linear_answer import Answer
+from host.sysid.linear.linear_answer import Answer
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer

@@ -12,7 +12,7 @@ from host.export.atomic_files import atomic_write
 from host.sysid.estimators.estimation_method import loaded
 from host.sysid.estimators.method_registry import find_method
 from host.sysid.estimators.settling import STEPS, settling_of
-from host.sysid.flight.linear_answer import Answer
+from host.sysid.linear.linear_answer import Answer
 
 
 def has_history(answer: Answer) -> bool:

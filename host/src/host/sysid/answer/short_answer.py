@@ -13,7 +13,7 @@ from host.sysid.answer.marks import FAIR, SMALL, share_text
 from host.sysid.answer.trust_rules import Evidence
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.coefficients.coefficient_fit import FLAG_SHARE
-from host.sysid.flight.linear_answer import Answer
+from host.sysid.linear.linear_answer import Answer
 from host.sysid.models.diagnostics import reference_values
 from host.sysid.models.parameter_units import parameter_unit
 

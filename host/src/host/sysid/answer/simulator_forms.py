@@ -18,7 +18,7 @@ from host.export.simulators.straight_coefficients import SURFACES, StraightCoeff
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.aircraft_export import identified_aircraft
 from host.sysid.coefficients.coefficient_fit import MeanCondition
-from host.sysid.flight.linear_answer import Answer
+from host.sysid.linear.linear_answer import Answer
 
 FLIGHTGEAR, CONTROL = "-set.xml", ".control.py"
 STRAIGHT: dict[str, Callable[[StraightCoefficients], str]] = {

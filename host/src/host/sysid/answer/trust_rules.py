@@ -23,7 +23,7 @@ from host.sysid.answer.method_agreement import disagreements
 from host.sysid.answer.parameter_places import leaning_on
 from host.sysid.checks.data_finding import Finding, open_channels
 from host.sysid.errors.systematic_errors import is_template, scaled_by_airspeed
-from host.sysid.flight.linear_answer import Answer
+from host.sysid.linear.linear_answer import Answer
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.validation.prediction_limits import FAILS, Prediction

@@ -14,8 +14,8 @@ from host.errors import IdentificationError
 from host.files.user_text import read_toml
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.mat_file import labels
-from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.linear_model import AXIS_OF
+from host.sysid.linear.linear_answer import Answer
+from host.sysid.linear.linear_model import AXIS_OF
 from host.sysid.models.modal_analysis import Mode
 
 if TYPE_CHECKING:

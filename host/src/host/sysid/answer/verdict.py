@@ -12,7 +12,7 @@ from host.sysid.answer.marks import Verdict
 from host.sysid.answer.model_agreement import disagreements_of_models
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence
 from host.sysid.checks.data_finding import open_channels
-from host.sysid.flight.linear_answer import Answer
+from host.sysid.linear.linear_answer import Answer
 from host.sysid.reconstruction.sensor_corrections import correction_lines
 
 if TYPE_CHECKING:

@@ -1,1 +1,1 @@
-"""A whole flight: files, maneuvers found, linear models fitted and validated."""
+"""Columns of a flight, prepared once for both estimators."""

@@ -10,7 +10,7 @@ from host.sysid.answer.mat_file import labels
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
-from host.sysid.flight.linear_answer import Answer
+from host.sysid.linear.linear_answer import Answer
 from host.sysid.models.diagnostics import reference_values
 from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.parameter_units import parameter_unit

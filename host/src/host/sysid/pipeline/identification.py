@@ -21,8 +21,8 @@ from host.sysid.answer.truth_comparison import truth_document, truth_report_line
 from host.sysid.answer.verdict import removed_error_lines, verdict_lines
 from host.sysid.checks.data_finding import Finding, finding_document
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
-from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
+from host.sysid.linear.linear_answer import Answer
 from host.sysid.pipeline.arguments import chosen_stretches, numbers_of, path_of
 from host.sysid.pipeline.estimate_table import estimate_table, mode_table
 from host.sysid.pipeline.flight_at_hand import listed_flights, read_flight

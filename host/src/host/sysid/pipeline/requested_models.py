@@ -16,7 +16,7 @@ from host.sysid.coefficients.coefficient_model import (
 )
 from host.sysid.estimators.method_registry import all_methods, find_method
 from host.sysid.estimators.method_registry import methods as single_methods
-from host.sysid.flight.linear_model import AXIS_OF, DEFAULT_METHOD, STAGED
+from host.sysid.linear.linear_model import AXIS_OF, DEFAULT_METHOD, STAGED
 from host.sysid.models.model_file import read_model
 from host.sysid.models.named_models import model_path, shipped_files, shipped_lines
 from host.sysid.models.state_space_model import CONSTANT, LinearModel

@@ -13,8 +13,8 @@ from host.errors import IdentificationError
 from host.sysid.answer.figure_kinds import Trace, histories
 from host.sysid.answer.mat_file import labels
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
-from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight, flown_maneuvers
+from host.sysid.linear.linear_answer import Answer
 from host.sysid.maneuvers.maneuver_selection import excited_axes, merge_overlapping
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.maneuver import Maneuver

@@ -16,9 +16,9 @@ from host.sysid.checks.data_finding import accepted_in_vain
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, CoefficientEstimator
 from host.sysid.estimators.method_options import check_options, options_of
 from host.sysid.flight.estimator import answer_of
-from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.linear_estimator import LinearEstimator
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
+from host.sysid.linear.linear_answer import Answer
+from host.sysid.linear.linear_estimator import LinearEstimator
 from host.sysid.pipeline.arguments import (
     path_of,
     paths_of,

@@ -17,8 +17,8 @@ from host.sysid.estimators.servo_parameters import (
     estimate_servo,
 )
 from host.sysid.estimators.start_values import start_values_of
-from host.sysid.flight.first_departures import remove_departures
 from host.sysid.flight.reconstructed_flight import FlownManeuver, ReconstructedFlight
+from host.sysid.linear.first_departures import remove_departures
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel

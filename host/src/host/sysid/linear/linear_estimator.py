@@ -38,30 +38,30 @@ from host.sysid.estimators.gust_model import VANES
 from host.sysid.estimators.gust_penetration import without_gust_penetration
 from host.sysid.estimators.method_registry import fit, refuse_unless_finite
 from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
-from host.sysid.flight.commanded_surfaces import brought_behind, servo_of
 from host.sysid.flight.filter_step import with_filter_step
-from host.sysid.flight.first_departures import first_departures, remove_departures
 from host.sysid.flight.fitted_maneuvers import (
     columns_of,
     fitted_and_held_out,
 )
-from host.sysid.flight.gust_at_trim import fit_gust_at_trim
-from host.sysid.flight.left_out_motion import fit_beside_left_out, unaccounted_motion
-from host.sysid.flight.linear_answer import Answer
-from host.sysid.flight.linear_intervals import linear_intervals
-from host.sysid.flight.linear_model import (
+from host.sysid.flight.reconstructed_flight import (
+    FlownManeuver,
+    ReconstructedFlight,
+)
+from host.sysid.linear.commanded_surfaces import brought_behind, servo_of
+from host.sysid.linear.first_departures import first_departures, remove_departures
+from host.sysid.linear.gust_at_trim import fit_gust_at_trim
+from host.sysid.linear.left_out_motion import fit_beside_left_out, unaccounted_motion
+from host.sysid.linear.linear_answer import Answer
+from host.sysid.linear.linear_intervals import linear_intervals
+from host.sysid.linear.linear_model import (
     AXIS_OF,
     DEFAULT_METHOD,
     GUST,
     model_and_method,
     standard_delays,
 )
-from host.sysid.flight.linear_stages import LinearEstimate, LinearIntervals, LinearValidation
-from host.sysid.flight.linear_validation import linear_validation
-from host.sysid.flight.reconstructed_flight import (
-    FlownManeuver,
-    ReconstructedFlight,
-)
+from host.sysid.linear.linear_stages import LinearEstimate, LinearIntervals, LinearValidation
+from host.sysid.linear.linear_validation import linear_validation
 from host.sysid.maneuvers.maneuver_selection import excited_axes
 from host.sysid.models.diagnostics import (
     assess_identifiability,

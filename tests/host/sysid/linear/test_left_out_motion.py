@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from host.arrays import Array
 from host.sysid.answer import verdict_of
-from host.sysid.flight.linear_answer import Answer
+from host.sysid.linear.linear_answer import Answer
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models import Trim, template
 from scipy import signal

@@ -30,7 +30,7 @@ from host.sysid.estimators.coherence_inflation import inflate_by_coherence, wide
 from host.sysid.estimators.gust_penetration import with_unknown_roll_lag
 from host.sysid.estimators.missing_control import missing_control, widened_by_missing_control
 from host.sysid.flight.filter_step import others_recorded
-from host.sysid.flight.linear_stages import LinearEstimate, LinearIntervals
+from host.sysid.linear.linear_stages import LinearEstimate, LinearIntervals
 from host.sysid.maneuvers.pilot_takeover import taken_over
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver

@@ -1,0 +1,1 @@
+"""Linear models of a flight: fitted, their intervals, validated."""
