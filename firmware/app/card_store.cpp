@@ -34,6 +34,8 @@ __attribute__((noinline)) CardFault judge_card_head(const char* aircraft, core::
   if (fault != CardFault::kNone && fault != CardFault::kAircraft && fault != CardFault::kLimits) {
     return fault;
   }
+  // More axes than a card has room for: their bytes would be read from behind the EEPROM.
+  if (head.learned_axes > frames::kCardMostAxes) return CardFault::kLimits;
   if (!hash_holds(head)) return CardFault::kCrc;
   *limits = core::row_limits(head);
   return fault;
@@ -45,15 +47,26 @@ __attribute__((noinline)) CardFault judge_card_row(uint8_t row, const core::RowL
   return core::judge_row(bytes, limits);
 }
 
+__attribute__((noinline)) bool learned_axis_good(uint8_t n) {
+  const uint16_t at = static_cast<uint16_t>(card_axis_part(n) * frames::kCardPartBytes);
+  core::AxisCard axis;
+  read_card(at, &axis, sizeof axis);
+  return core::axis_good(axis);
+}
+
+__attribute__((noinline)) bool learned_worth_good(uint8_t n) {
+  const uint16_t at = static_cast<uint16_t>((card_axis_part(n) + 1U) * frames::kCardPartBytes);
+  frames::CardWorthLayout worth;
+  read_card(at, &worth, sizeof worth);
+  return core::worth_good(worth);
+}
+
 __attribute__((noinline)) bool learning_good(uint8_t rows, uint8_t axes) {
   for (uint8_t row = 0; row < rows; ++row) {
     if (!core::axis_of_row_good(card_axis_of_row(row), axes)) return false;
   }
   for (uint8_t n = 1; n <= axes; ++n) {
-    core::AxisCard axis;
-    read_card(
-        static_cast<uint16_t>(card_axis_part(n) * frames::kCardPartBytes), &axis, sizeof axis);
-    if (!core::axis_good(axis)) return false;
+    if (!learned_axis_good(n) || !learned_worth_good(n)) return false;
   }
   return true;
 }

@@ -34,6 +34,7 @@ from tests.sitl.input_flight import (
     AILERON,
     ANALOG_S,
     ARMED_US,
+    BAROMETER_NOISE_PA,
     DIRECT_US,
     ELEVATOR,
     FRAME_S,
@@ -66,7 +67,6 @@ COUNT_PA = 4.88  # of one conversion
 HALF_DENSITY = 0.6125
 MOST_REFUSED = 0.001
 PRESSURE_A_METRE = 12.0
-BAROMETER_NOISE_PA = 3.0  # BMP085 data sheet, rms at its highest resolution
 ROW = cards.row(shape=cards.PULSE, axes=2, quiet_ms=100, duration_ms=100, amplitude_us=(0, 100, 0))
 # Whatever the logger takes: only the proof of flight and the height stand between card and ground.
 LOOSE = {

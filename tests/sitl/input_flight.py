@@ -35,6 +35,7 @@ IDLE_US, CRUISE_US = 1100, 1600
 LEAST_US, MOST_US = 1150, 1850  # the travel that the pilot shows
 STILL_UP, PASCAL_UP = 95_372.0, 2.67  # at 34.4 kPa by these coefficients; its UP per pascal
 CLIMB_PA = 900.0
+BAROMETER_NOISE_PA = 3.0  # BMP085 data sheet, rms at its highest resolution
 HOME = (247_000_000, 1_210_000_000)
 
 
@@ -156,7 +157,8 @@ def input_flight(
 
     at = np.arange(int(seconds / PRESSURE_S) + 4) * PRESSURE_S
     climb_pa = np.clip((at - UP_S) / (MEGA_S - UP_S), 0.0, 1.0) * CLIMB_PA
-    up = STILL_UP - PASCAL_UP * climb_pa + random.normal(0.0, 2.0, len(at))
+    noise_pa = random.normal(0.0, BAROMETER_NOISE_PA, len(at))
+    up = STILL_UP + PASCAL_UP * (noise_pa - climb_pa)
 
     at = np.arange(int(seconds / GPS_S) - 1) * GPS_S
     gone_m = 15.0 * np.maximum(0.0, at - UP_S)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -9,9 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from host.link.card_console import CardConsole, CardError
 from host.planning.learning_card import SIX_HARMONICS, LearningCondition, learning_card
 from host.planning.onboard_sums import PITCH, ROLL, SAMPLE_HZ, AxisCard, FourierSums
+from host.twin.recorder.flight_card_line import SitlLine
 from host.twin.recorder.sitl_library import TICKS_PER_S, Level
+from host.wire.flight_card import card_faults
 from host.wire.schema_text import packed_schema
 from numpy.typing import NDArray
 from studies.onboard_equation_error import EquationError, Learned
@@ -162,6 +166,22 @@ def test_learning_alters_no_pulse() -> None:
     )
     for mine, theirs in zip(plain.sitl.pulses(), learning.sitl.pulses(), strict=True):
         assert np.array_equal(np.asarray(mine), np.asarray(theirs))
+
+
+def test_a_card_of_too_many_axes_or_of_no_numbers_is_none() -> None:
+    """Bounded before the hash is reckoned; host and logger refuse the same."""
+    many = cards.card([ROW], AXES, [1], learned_axes=255)
+    endless = cards.card([ROW], [replace(AXES[0], lever=math.inf)], [1])
+    worthless = cards.card([ROW], [replace(AXES[0], gain=(math.nan, 1.0, 1.0))], [1])
+    for data, fault in ((many, "limits"), (endless, "learning"), (worthless, "learning")):
+        bench = Bench()
+        bench.sitl.set_eeprom(cards.eeprom_with(data))
+        bench.sitl.power_on()
+        bench.sitl.run_for(1.0)
+        line = SitlLine(bench.sitl)
+        with pytest.raises(CardError, match=fault):
+            CardConsole(line, line.now_s).read()
+        assert card_faults(data)
 
 
 def test_enough_is_one_tone(tmp_path: Path) -> None:

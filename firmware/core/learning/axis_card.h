@@ -53,8 +53,26 @@ struct DerivativeWorth {
 inline uint8_t signals_of(LearningAxis axis) {
   return axis == LearningAxis::kPitch ? 3 : 5;
 }
-// Of the harmonics and signals there is memory for all, and each bit of `told` has a signal.
+// Singles, none of which is infinite or no number: by their bits, the lowest byte first.
+inline bool all_finite(const uint8_t* bytes, uint8_t singles) {
+  for (; singles != 0; --singles, bytes += 4) {
+    if ((bytes[3] & 0x7FU) == 0x7FU && (bytes[2] & 0x80U) != 0) return false;
+  }
+  return true;
+}
+inline bool worth_good(const frames::CardWorthLayout& worth) {
+  constexpr uint8_t kSingles = 2 * kMostSignals;
+  static_assert(offsetof(frames::CardWorthLayout, gain) == 0 &&
+                    offsetof(frames::CardWorthLayout, wanted_percent) == 4 * kSingles,
+                "gains and tolerances, and nothing between");
+  return all_finite(reinterpret_cast<const uint8_t*>(&worth), kSingles);
+}
+// Of the harmonics and signals there is memory for all, each bit of `told` has a signal, and every
+// number is one.
 inline bool axis_good(const AxisCard& card) {
+  constexpr uint8_t kFirst = offsetof(AxisCard, advance_s);
+  const uint8_t* const singles = reinterpret_cast<const uint8_t*>(&card) + kFirst;
+  if (!all_finite(singles, (sizeof card - kFirst) / 4)) return false;
   if (static_cast<uint8_t>(card.axis) > static_cast<uint8_t>(LearningAxis::kYaw)) return false;
   const uint8_t signals = signals_of(card.axis);
   return card.harmonic_count != 0 && card.harmonic_count <= kMostHarmonics &&

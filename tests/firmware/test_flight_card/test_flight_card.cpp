@@ -3,6 +3,7 @@
 
 #include "check.h"
 #include "core/flight_card.h"
+#include "core/learning/axis_card.h"
 #include "random_numbers.h"
 
 namespace {
@@ -284,6 +285,30 @@ TEST_CASE("the components of a multisine") {
         row.components[i + 2] = 1 << 6 | 26;
       },
       no)
+}
+
+TEST_CASE("a single that is no number is found wherever it stands") {
+  core::AxisCard axis = {};
+  axis.harmonic_count = 6;
+  frames::CardWorthLayout worth = {};
+  CHECK(core::axis_good(axis));
+  CHECK(core::worth_good(worth));
+  const uint32_t numbers[] = {
+      0x7F800000, 0xFF800000, 0x7FC00000, 0x7F800001, 0x7F7FFFFF, 0x807FFFFF};
+  for (const uint32_t bits : numbers) {
+    const bool finite = (bits & 0x7F800000U) != 0x7F800000U;
+    for (uint8_t at = offsetof(core::AxisCard, advance_s); at < sizeof axis;
+         at = static_cast<uint8_t>(at + 4)) {
+      core::AxisCard bad = axis;
+      memcpy(reinterpret_cast<uint8_t*>(&bad) + at, &bits, sizeof bits);
+      CHECK_EQ(core::axis_good(bad), finite);
+    }
+    for (uint8_t at = 0; at < 40; at = static_cast<uint8_t>(at + 4)) {
+      frames::CardWorthLayout bad = worth;
+      memcpy(reinterpret_cast<uint8_t*>(&bad) + at, &bits, sizeof bits);
+      CHECK_EQ(core::worth_good(bad), finite);
+    }
+  }
 }
 
 TEST_CASE("random bytes are no card") {

@@ -222,6 +222,12 @@ def _learning_faults(data: bytes, rows: int, axes: int) -> Iterator[str]:
         count, most = axis["harmonic_count"], min(len(axis["harmonics"]), MOST_SUMS // signals)
         if not 1 <= count <= most:
             yield f"learned axis {n + 1}: {count} harmonics, expected 1 to {most}"
+    for place, part in enumerate(parts(data)[heads + rows :]):
+        n, worth = divmod(place, number("card_axis_parts"))
+        record = np.frombuffer(part, dtype=dtype(WORTH if worth else AXIS), count=1)
+        for name in record.dtype.names or ():
+            if record[name].dtype.kind == "f" and not np.isfinite(record[name]).all():
+                yield f"learned axis {n + 1}: {name} is not finite"
 
 
 def _limit_faults(head: Mapping[str, Any]) -> Iterator[str]:

@@ -175,7 +175,9 @@ def fly_input(
     errors = np.concatenate([np.array(of_servo) for of_servo in watch.error_us])
     deflected_us = float(np.ptp(watch.width_us[ELEVATOR]))
     rig.run_to(rig.flight.seconds)
-    told, untouched = chip.uart_sent(3).count(LEARNED_HEAD), chip.untouched_stack(stack, painted)
+    told = chip.uart_sent(3).count(LEARNED_HEAD)
+    # What was taken and left unwritten shows in the stack pointer alone.
+    untouched = min(chip.untouched_stack(stack, painted), chip.lowest_sp + 1 - stack)
     chip.power_off()
     chip.close()
     check_card(folder / CARD)
