@@ -249,8 +249,13 @@ void TestInputs::see(const Sensors& sensors, core::InputWatch& watch, uint32_t n
   }
   watch.looked_us = now;
   watch.motion.age(now_us);
-  look_for_flight(sensors, now_us + kAheadUs);
   sensors.ages(&in, now_us + kAheadUs);
+  if (scanned) {
+    sensors.gps_readings(&in);
+    flying_.look(in, now_us + kAheadUs);
+  } else if (in.scan_age_us > core::kInputScanAgeUs) {
+    look_for_flight(sensors, now_us + kAheadUs);
+  }
   watch.found[InputWatch::kHeard] = core::judge_heard(watch.limits, in, watch.motion, now_us);
 }
 
