@@ -22,7 +22,7 @@ namespace app {
 
 class Instrument {
  public:
-  // 500 ms of frames at 100 Hz filled 4350 B of it, 250 ms at 200 Hz 4203 B.
+  // 500 ms of frames at 100 Hz filled 4350 B of it, 250 ms at 200 Hz 4221 B.
   static constexpr uint16_t kRingBytes = 4668;
 
   Instrument() = default;
