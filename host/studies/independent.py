@@ -23,7 +23,7 @@ from host.compiled import prefer_machine_code
 from host.errors import IdentificationError
 from host.instrument.instrument_errors import usual_errors
 from host.physical.recording import FOREIGN, Recording
-from host.sysid.answer import CAREFUL, TRUSTED, verdict_of
+from host.sysid.answer import CAREFUL, TRUSTED
 from host.sysid.pipeline import at_hand, identify_columns
 
 import host
@@ -97,10 +97,11 @@ def dimensional(measured: Columns, axis: str) -> Iterator[Found]:
     # The airspeed of these flights has noise, no error of scale.
     exact = usual_errors(FOREIGN).scaled(0.0, "pitot_scale", "pitot_zero_pa", "density_share")
     flown = at_hand(measured, recording=Recording(maker=FOREIGN), errors=exact)
-    [answer] = identify_columns(flown, models=axis).linear
+    found = identify_columns(flown, models=axis)
+    [answer] = found.linear
     expected = derivatives(answer.trim.airspeed_mps)  # where the answer says that it holds
     half, result = answer.result.half_width(), answer.result
-    marks = verdict_of(answer).marks
+    marks = found.verdicts[0].marks
     for name in NAMES[axis]:
         width = float(half[result.index(name)])
         yield name, expected[name], result.value(name), width, marks[name]

@@ -24,7 +24,6 @@ import pandas as pd
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.errors import IdentificationError
-from host.sysid.answer import verdict_of
 from host.sysid.models import NonlinearModel, equations_from
 from host.twin.testcard.cards import Card, load
 from host.twin.virtual import VirtualFlight, virtual_flight
@@ -132,7 +131,7 @@ def rows_of(
     except IdentificationError as error:
         return [cell | dict.fromkeys(COLUMNS[3:], "") | {"mark": str(error)}]
     answer = found.linear[0]
-    marks = verdict_of(answer, found.evidence).marks
+    marks = found.verdicts[0].marks
     half = answer.result.half_width()
     rows = []
     for name in [p.name for p in own.parameters]:

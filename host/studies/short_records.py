@@ -18,7 +18,7 @@ from host.compiled import prefer_machine_code
 from host.constants import GRAVITY_MPS2
 from host.errors import IdentificationError
 from host.physical.recording import FOREIGN, Recording
-from host.sysid.answer import CAREFUL, TRUSTED, verdict_of
+from host.sysid.answer import CAREFUL, TRUSTED
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models import Trim, template
 from host.sysid.pipeline import at_hand, identify_columns
@@ -133,11 +133,12 @@ def rows_of(
     key = (seed, name, air, model_name, length_s)
     try:
         flown = at_hand(columns, windows=(maneuver,), recording=Recording(maker=FOREIGN))
-        [answer] = identify_columns(flown, models=model_name).linear
+        found = identify_columns(flown, models=model_name)
     except IdentificationError:
         yield dict(zip(COLUMNS, (*key, "refused"), strict=False))
         return
-    half, marks = answer.result.half_width(), verdict_of(answer).marks
+    [answer] = found.linear
+    half, marks = answer.result.half_width(), found.verdicts[0].marks
     for one in MODELS[model_name][2]:
         k = answer.result.index(one)
         row = (*key, one, aircraft.truth[one], answer.result.estimate[k], half[k], marks[one])

@@ -18,13 +18,12 @@ import numpy as np
 from host.compiled import prefer_machine_code
 from host.errors import IdentificationError
 from host.physical.recording import FOREIGN, Recording
-from host.sysid.answer import CAREFUL, TRUSTED, verdict_of
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.answer import CAREFUL, TRUSTED
 from host.sysid.models import Maneuver
 from host.sysid.numerics.input_coherence import input_coherence
 from host.sysid.numerics.output_error import minimise
 from host.sysid.numerics.output_error_problem import OutputProblem
-from host.sysid.pipeline import at_hand, identify_columns
+from host.sysid.pipeline import Identification, at_hand, identify_columns
 
 from studies.aircraft import navion_structured
 from studies.coverage import NOISES as NOISE_COLOURS
@@ -92,8 +91,9 @@ def rows() -> Iterator[Row]:
 def judge(row: Row, seed: int, limit: dict[str, float]) -> list[Judged]:
     """Fly once, identify, and compare with the truth, or with the limit where there is none."""
     flight = fly(row.template, row.fault, row.noise, seed)
-    answer = answer_to(row, flight)
-    marks, half = verdict_of(answer).marks, answer.result.half_width()
+    identified = identified_from(row, flight)
+    [answer], marks = identified.linear, identified.verdicts[0].marks
+    half = answer.result.half_width()
     found = []
     for name in PRINCIPAL[row.template]:
         if name in answer.result.names:
@@ -103,17 +103,15 @@ def judge(row: Row, seed: int, limit: dict[str, float]) -> list[Judged]:
     return found
 
 
-def answer_to(row: Row, flight: LinearFlight) -> Answer:
-    """Return the answer of `host identify` to a flight."""
+def identified_from(row: Row, flight: LinearFlight) -> Identification:
+    """Return what `host identify` says of a flight."""
     flown = at_hand(flight.columns, windows=flight.windows, recording=Recording(maker=FOREIGN))
-    model = flight.model or row.template
-    [answer] = identify_columns(flown, models=model, methods=row.method).linear
-    return answer
+    return identify_columns(flown, models=flight.model or row.template, methods=row.method)
 
 
 def noise_free_limit(row: Row) -> dict[str, float]:
     """Return the limit of the estimator of an equation without noise."""
-    answer = answer_to(row, fly(row.template, row.fault, "white", 0, scale=QUIET))
+    [answer] = identified_from(row, fly(row.template, row.fault, "white", 0, scale=QUIET)).linear
     return {n: answer.result.value(n) for n in answer.model.parameter_names}
 
 

@@ -22,6 +22,7 @@ from host.sysid.answer.figure_kinds import (
 from host.sysid.flight.flight_tables import read_columns
 
 from tests.host.sysid.at_hand import identify
+from tests.host.sysid.verdicts import verdict_of
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +44,7 @@ def test_every_method_shows_outputs_beside_outputs(
         assert simulated.shape == maneuver.outputs.shape
         gap = np.std(simulated - maneuver.outputs, axis=0) / np.std(maneuver.outputs, axis=0)
         assert gap.max() < 0.6
-    drawn = draw(answer, "x")
+    drawn = draw(answer, "x", verdict_of(answer))
     # All are written once; of the other methods the picture of outputs, which is asked for here.
     written = save_all(drawn if method == "equation-error" else {"x_fit": drawn["x_fit"]}, tmp_path)
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted(p.name for p in written)

@@ -12,12 +12,12 @@ from host.sysid.answer import CAREFUL, MARKS, TRUSTED, answer_document, json_tex
 from host.sysid.answer.converted_marks import converted_marks
 from host.sysid.answer.marks import SMALL, UNSURE
 from host.sysid.answer.short_answer import short_table
-from host.sysid.answer.trust_rules import NO_EVIDENCE
 from host.sysid.linear.linear_answer import Answer
 from host.sysid.pipeline.estimate_table import estimate_table
 from studies.wrong_flights import fly
 
 from tests.host.sysid.at_hand import identify
+from tests.host.sysid.verdicts import verdict_of
 
 WIDTHS = (0.0, 0.05, 0.0999, 0.1001, 0.3, 0.31, 2.0)
 
@@ -58,10 +58,11 @@ def test_without_a_mark_of_the_derivative_there_is_none(answer: Answer) -> None:
 def test_table_json_and_screen_say_it(answer: Answer, share: float, mark: str) -> None:
     """Of a derivative under trust, whose coefficient mass and inertia widen."""
     wide = _with(answer, share)
-    table = estimate_table([wide], None)
+    verdict = verdict_of(wide)
+    table = estimate_table([wide], None, [verdict])
     assert table.loc[(wide.template, "M_q"), "verdict"] == TRUSTED
     assert table.loc[(wide.template, "Cm_q"), "verdict"] == mark
-    document = json.loads(json_text(answer_document(wide, [])))
+    document = json.loads(json_text(answer_document(wide, [], verdict)))
     assert document["coefficients"]["Cm_q"]["mark"] == mark
-    (row,) = [line for line in short_table([wide], None, NO_EVIDENCE) if "Cm_q" in line]
+    (row,) = [line for line in short_table([wide], None, [verdict]) if "Cm_q" in line]
     assert row.endswith(f", {mark}") is (mark != TRUSTED)

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 from host.cli import main
-from host.sysid.answer import verdict_lines
 from host.sysid.answer.method_comparison import method_table
 from host.sysid.estimators import methods
 from host.sysid.flight.flight_tables import read_columns
@@ -14,6 +13,7 @@ from host.sysid.linear.linear_model import STAGED
 from host.sysid.maneuvers.maneuver_selection import select_maneuvers
 
 from tests.host.sysid.at_hand import identify
+from tests.host.sysid.verdicts import verdict_lines
 
 SLOW = {"hopfield-line-search", "genetic", "unscented-kalman", "filter-error"}
 

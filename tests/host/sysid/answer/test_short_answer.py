@@ -57,7 +57,7 @@ def test_the_short_answer_is_a_screen(found: host.Identification) -> None:
 def test_the_table_never_leaves_the_screen(
     found: host.Identification, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rows = short_answer.short_table(found.linear * 20, None, found.evidence)
+    rows = short_answer.short_table(found.linear * 20, None, found.verdicts * 20)
     assert len(rows) == short_answer.MOST_LINES
     assert "more: --full" in rows[-1]
 

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from host.sysid.answer import CAREFUL, TRUSTED, answer_document, verdict_lines, verdict_of
+from host.sysid.answer import CAREFUL, TRUSTED, answer_document
 from host.sysid.answer.servo_lines import servo_document
-from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, driven_by_inputs
+from host.sysid.answer.trust_rules import Evidence, driven_by_inputs
 from host.sysid.checks.data_finding import Finding
 from host.sysid.estimators.servo_parameters import SERVO, ServoEstimate, ServoNumber
 from host.sysid.linear.linear_answer import Answer
@@ -15,6 +15,7 @@ from host.sysid.validation.prediction_limits import Prediction
 from studies.wrong_flights import LinearFlight, fly
 
 from tests.host.sysid.at_hand import identify
+from tests.host.sysid.verdicts import NO_EVIDENCE, verdict_lines, verdict_of
 
 RELIED_ON = (TRUSTED, CAREFUL)
 METHOD = "output-error"
@@ -237,7 +238,7 @@ def test_every_reason_is_in_the_words_and_in_the_document(right: Answer) -> None
     found = Finding("surface-sign", ("elevator_rad",), "the elevator works backwards")
     evidence = Evidence((right,), (found,))
     lines = verdict_lines([right], [], evidence)
-    marks = answer_document(right, lines, evidence)["marks"]
+    marks = answer_document(right, lines, verdict_of(right, evidence))["marks"]
     assert set(marks) == set(verdict_of(right).marks)
     assert all(entry["reasons"] for entry in marks.values())
     reason = marks["M_de"]["reasons"][-1]

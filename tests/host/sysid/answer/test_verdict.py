@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.aircraft.mass_properties import Condition
-from host.sysid.answer import verdict_lines
 from host.sysid.answer.estimate_lines import model_lines
 from host.sysid.answer.marks import share_text
 from host.sysid.answer.trust_rules import unpredicted_states
@@ -18,6 +17,8 @@ from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.models.templates import TEMPLATES
 from studies.aircraft import navion_structured
 from studies.data import noisy
+
+from tests.host.sysid.verdicts import verdict_lines
 
 
 @pytest.fixture(scope="module")

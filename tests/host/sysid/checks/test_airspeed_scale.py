@@ -9,13 +9,8 @@ import pytest
 from host.instrument.deviations import SensorErrorModel, unknown_sensors
 from host.physical.calibration import load_calibration
 from host.physical.recording import FOREIGN, Recording
-from host.sysid.answer import TRUSTED, verdict_of
-from host.sysid.checks.airspeed_scale import (
-    CERTAIN,
-    CHECK,
-    airspeed_scale,
-    airspeed_scale_findings,
-)
+from host.sysid.answer import TRUSTED
+from host.sysid.checks.airspeed_scale import CERTAIN, CHECK, airspeed_scale, airspeed_scale_findings
 from studies.foreign.flight import Air
 from studies.foreign.instrument import SENSORS_FILE, Columns, with_sensor_errors
 from studies.independent import cells, flown, identified
@@ -93,7 +88,6 @@ def test_nothing_is_under_trust_by_an_airspeed_that_is_not_its_files() -> None:
     answer = identified(flown(CALM, SEED), CALM, SEED, ("lateral", "coefficients"),
                         partial(faster, 1.1))  # fmt: skip
     assert CHECK in {f.check for f in answer.findings}
-    verdicts = [verdict_of(one, answer.evidence) for one in answer.answers]
-    marks = [mark for verdict in verdicts for mark in verdict.marks.values()]
+    marks = [mark for verdict in answer.verdicts for mark in verdict.marks.values()]
     assert len(marks) > 20
     assert TRUSTED not in marks

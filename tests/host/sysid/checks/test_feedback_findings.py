@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.cli import main
-from host.sysid.answer import CAREFUL, TRUSTED, verdict_of
+from host.sysid.answer import CAREFUL, TRUSTED
 from host.sysid.answer.coefficient_rules import input_feedback
 from host.sysid.answer.feedback_pairs import alike_derivatives, combined_derivatives
 from host.sysid.answer.trust_rules import Evidence
@@ -26,6 +26,7 @@ from studies.wrong_flights import fly
 from tests.host.logs import ROOT
 from tests.host.sysid.at_hand import identify
 from tests.host.sysid.closed_loop import DT_S, Law, doublets, flown, tracked
+from tests.host.sysid.verdicts import verdict_of
 
 SAMPLES = 1600
 STARTS = (100, 400, 700, 1000, 1300)

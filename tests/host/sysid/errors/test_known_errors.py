@@ -7,7 +7,7 @@ import pytest
 from host.instrument.deviations import unknown_sensors
 from host.physical.calibration import load_calibration
 from host.physical.recording import FOREIGN, Recording
-from host.sysid.answer import TRUSTED, verdict_of
+from host.sysid.answer import TRUSTED
 from host.sysid.errors.systematic_errors import systematic_residuals
 from host.sysid.linear.linear_answer import Answer
 from host.sysid.models import Maneuver, Trim, template
@@ -26,10 +26,14 @@ SEED = 24310
 def test_a_right_flight_in_calm_air_stays_under_trust(axis: str, may_be_said: bool) -> None:
     """Of six lateral flights three had lost N_beta, five were accused."""
     identified = answer_with_file(Air(), SEED, axis)
-    [answer] = [a for a in identified.answers if isinstance(a, Answer) and a.template == axis]
+    [(answer, verdict)] = [
+        (a, v)
+        for a, v in zip(identified.answers, identified.verdicts, strict=True)
+        if isinstance(a, Answer) and a.template == axis
+    ]
     assert answer.coherence is not None
     assert may_be_said or not answer.coherence.coherent
-    marks = verdict_of(answer, identified.evidence).marks
+    marks = verdict.marks
     assert [name for name in NAMES[axis] if marks[name] != TRUSTED] == []
 
 

@@ -6,12 +6,13 @@ Two parameters that are right beside it stay as they are known.
 import numpy as np
 import pytest
 from host.physical.recording import FOREIGN
-from host.sysid.answer import TRUSTED, verdict_of
+from host.sysid.answer import TRUSTED
 from host.sysid.linear.linear_answer import Answer
 from studies import wrong_flights
 from studies.wrong_flights import LinearFlight
 
 from tests.host.sysid.at_hand import identify
+from tests.host.sysid.verdicts import verdict_of
 
 SEEDS = range(12150, 12153)
 

@@ -18,7 +18,7 @@ from host.sysid.aerodynamics.coefficient_table import (
     coefficient_parts,
     coefficients,
 )
-from host.sysid.answer import true_coefficients, verdict_lines
+from host.sysid.answer import true_coefficients
 from host.sysid.answer.estimate_lines import model_lines
 from host.sysid.errors.sampling_error import HOLD
 from host.sysid.errors.systematic_errors import add_systematic_covariance, systematic_error_shifts
@@ -47,6 +47,7 @@ import host
 from tests.host.sysid import recorded
 from tests.host.sysid.at_hand import identify
 from tests.host.sysid.recorded import NAME, Columns
+from tests.host.sysid.verdicts import verdict_lines
 
 
 @pytest.fixture(scope="module")

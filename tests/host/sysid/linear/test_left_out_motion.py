@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from host.arrays import Array
-from host.sysid.answer import verdict_of
 from host.sysid.linear.linear_answer import Answer
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models import Trim, template
@@ -14,6 +13,7 @@ from studies import short_records
 from studies.wrong_flights import NOISE_SD, TRUTH
 
 from tests.host.sysid.at_hand import identify
+from tests.host.sysid.verdicts import verdict_of
 
 DT_S = 0.02
 TRIM = Trim(17.0, 0.06, 0.06)

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from host.sysid.answer import verdict_lines
 from host.sysid.flight.flight_tables import read_columns
 from scipy.signal import lsim
 
 from tests.host.sysid.at_hand import identify
+from tests.host.sysid.verdicts import verdict_lines
 
 
 @pytest.mark.parametrize("method", ["flight", "output-error", "stepwise"])

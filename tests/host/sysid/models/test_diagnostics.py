@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import Condition
 from host.sysid import Maneuver, fit
-from host.sysid.answer import answer_document, verdict_lines
+from host.sysid.answer import answer_document
 from host.sysid.answer.estimate_lines import model_lines
 from host.sysid.linear.linear_answer import Answer
 from host.sysid.models import Parameter, Term, Trim, model_from
@@ -26,6 +26,8 @@ from host.sysid.models.modal_analysis import modes, modes_of
 from scipy import signal, stats
 from studies.aircraft import navion, navion_free, navion_structured
 from studies.data import TRUTH, noisy
+
+from tests.host.sysid.verdicts import verdict_lines, verdict_of
 
 
 def test_figures_of_fit_equal_their_definitions() -> None:
@@ -141,7 +143,7 @@ def test_both_grades_reach_the_words_the_table_and_the_document() -> None:
     )
     text = verdict_lines([answer], [])
     table = model_lines(answer)
-    document = answer_document(answer, text)
+    document = answer_document(answer, text, verdict_of(answer))
     for named in found.flags:
         warning = "do not use" if named.grade == NOT_IDENTIFIABLE else "doubtful,"
         assert f"  {warning} {named.name}: {named.reason}" in text

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from host.sysid.answer import verdict_of
 from host.sysid.answer.model_agreement import RELIED_ON
 from host.sysid.estimators import fit
 from host.sysid.linear.linear_answer import Answer
@@ -20,6 +19,7 @@ from studies.wrong_flights import fly
 
 import host
 from tests.host.sysid.at_hand import identify
+from tests.host.sysid.verdicts import verdict_of
 
 WORDS = "more than the fit's own gusts and noise allow"
 

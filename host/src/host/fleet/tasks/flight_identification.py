@@ -134,7 +134,8 @@ def _doubted(found: Identification) -> list[str]:
         doubts += [one for law in laws for one in input_feedback(answer, law)]
         return sorted({name for doubt in doubts for name in doubt.names})
     rules = (trust_rules.open_finding, trust_rules.input_feedback)
-    doubts = [one for a in found.linear for rule in rules for one in rule(a, found.evidence)]
+    evidence = trust_rules.Evidence(found.linear, found.findings)
+    doubts = [one for a in found.linear for rule in rules for one in rule(a, evidence)]
     names = {name for doubt in doubts for name in doubt.names}
     linear_names = {c.name for answer in found.linear for c in answer.coefficients}
     return sorted(name for name in linear_names if dimensional_name(name) in names)

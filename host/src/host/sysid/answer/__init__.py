@@ -8,23 +8,23 @@ from host.faces import lazily
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from host.sysid.answer.json_document import answer_document, json_text
-    from host.sysid.answer.marks import CAREFUL, MARKS, TRUSTED
+    from host.sysid.answer.marks import CAREFUL, MARKS, TRUSTED, Verdict
     from host.sysid.answer.output_files import OutputPaths, check_outputs
     from host.sysid.answer.truth_comparison import read_truth, true_coefficients
-    from host.sysid.answer.verdict import verdict_lines, verdict_of
+    from host.sysid.answer.verdict import judge
 
 __all__ = [
     "CAREFUL",
     "MARKS",
     "TRUSTED",
     "OutputPaths",
+    "Verdict",
     "answer_document",
     "check_outputs",
     "json_text",
+    "judge",
     "read_truth",
     "true_coefficients",
-    "verdict_lines",
-    "verdict_of",
 ]
 
 __getattr__ = lazily(
@@ -34,12 +34,12 @@ __getattr__ = lazily(
         "MARKS": "marks",
         "OutputPaths": "output_files",
         "TRUSTED": "marks",
+        "Verdict": "marks",
         "answer_document": "json_document",
         "check_outputs": "output_files",
         "json_text": "json_document",
+        "judge": "verdict",
         "read_truth": "truth_comparison",
         "true_coefficients": "truth_comparison",
-        "verdict_lines": "verdict",
-        "verdict_of": "verdict",
     },
 )

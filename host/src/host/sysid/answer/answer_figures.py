@@ -21,7 +21,7 @@ from host.sysid.answer.figure_kinds import (
     save,
     spectra,
 )
-from host.sysid.answer.linear_verdict import not_relied_on
+from host.sysid.answer.marks import UNSURE, USELESS, Verdict
 from host.sysid.answer.mat_file import labels
 from host.sysid.answer.truth_comparison import true_coefficients, true_poles
 from host.sysid.linear.linear_answer import Answer
@@ -44,6 +44,7 @@ GAP_S = 0.5  # between the maneuvers of a picture
 def draw_all(
     answers: Sequence[Answer],
     direct: CoefficientAnswer | None,
+    verdicts: Sequence[Verdict],
     flights: Sequence[Mapping[str, Array]],
     truth: dict[str, Any] | None = None,
 ) -> dict[str, Figure]:
@@ -53,6 +54,8 @@ def draw_all(
     ----------
     answers : sequence of Answer
     direct : CoefficientAnswer or None
+    verdicts : sequence of Verdict
+        Of all, linear ones first.
     flights : sequence of mapping
         Columns of what the coefficients were made of; surfaces give the spectrum of the inputs.
     truth : dict, optional
@@ -64,8 +67,8 @@ def draw_all(
         If matplotlib is missing.
     """
     found: dict[str, Figure] = {}
-    for answer, label in zip(answers, labels(answers), strict=True):
-        found |= draw(answer, label, truth)
+    for answer, label, verdict in zip(answers, labels(answers), verdicts, strict=False):
+        found |= draw(answer, label, verdict, truth)
     return found | (draw_coefficients(direct, flights, truth) if direct else {})
 
 
@@ -75,7 +78,9 @@ def save_all(pictures: Mapping[str, Figure], folder: Path) -> list[Path]:
     return [save(figure, folder / f"{name}.svg") for name, figure in named]
 
 
-def draw(answer: Answer, name: str, truth: dict[str, Any] | None = None) -> dict[str, Figure]:
+def draw(
+    answer: Answer, name: str, verdict: Verdict, truth: dict[str, Any] | None = None
+) -> dict[str, Figure]:
     """Return all pictures of one answer, their names beginning with `name`.
 
     `truth` of a simulated flight is marked on the map of poles.
@@ -88,7 +93,7 @@ def draw(answer: Answer, name: str, truth: dict[str, Any] | None = None) -> dict
     result = answer.result
     traces, kind = _linear_traces(answer)
     title = f"{answer.template}, {answer.method}: measured (grey), model (red): {kind}"
-    unreliable = not_relied_on(answer)
+    unreliable = {n for n, mark in verdict.marks.items() if mark in (UNSURE, USELESS)}
     half = result.half_width()
     size = reference_values(answer.model, answer.maneuvers, result.estimate)
     bars = [

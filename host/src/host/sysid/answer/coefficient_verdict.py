@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from host.sysid.answer.advised_inputs import advised_input
-from host.sysid.answer.coefficient_rules import coefficient_doubts, unpredicted
+from host.sysid.answer.coefficient_rules import unpredicted
 from host.sysid.answer.doubt import Doubt, reasons_by_name
 from host.sysid.answer.marks import (
     CAREFUL,
@@ -18,7 +18,6 @@ from host.sysid.answer.marks import (
     first_lines,
     share_text,
 )
-from host.sysid.checks.data_finding import Feedback
 from host.sysid.coefficients.coefficient_fit import FLAG_SHARE
 from host.sysid.coefficients.coefficient_model import standard_model
 
@@ -26,37 +25,25 @@ if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 
 
-def coefficient_verdict(
-    answer: CoefficientAnswer,
-    open_channels: Mapping[str, str] | None = None,
-    laws: Sequence[Feedback] = (),
-    more: Sequence[Doubt] = (),
-) -> Verdict:
-    """Return the verdict on each coefficient.
+def coefficient_marks(answer: CoefficientAnswer, doubts: Sequence[Doubt]) -> dict[str, str]:
+    """Return the mark of each coefficient by its interval and all doubts about it."""
+    reasons, marks = reasons_by_name(doubts), {}
+    for d in answer.fit.derivatives:
+        sharp = TRUSTED if d.share <= TRUST else CAREFUL
+        wide = USELESS if d.share > 1.0 else UNSURE
+        marks[d.name] = wide if d.flagged or d.name in reasons else sharp
+    return marks
 
-    Parameters
-    ----------
-    answer : CoefficientAnswer
-    open_channels : mapping, optional
-        Column with an open finding of the data checks to the check.
-    laws : sequence of Feedback
-        Of surfaces that follow states.
-    more : sequence of Doubt
-        From outside the rules: what linear models say.
-    """
+
+def coefficient_verdict(answer: CoefficientAnswer, doubts: Sequence[Doubt]) -> Verdict:
+    """Return the verdict on each coefficient, by all doubts there are."""
     along = sum(w.longitudinal for w in answer.windows)
     own = "" if answer.model == standard_model() else f" by the terms of '{answer.model.name}'"
     heading = (
         f"coefficients{own}: {along} maneuvers of the elevator, {len(answer.windows) - along} of"
         " aileron and rudder fitted jointly, errors of the instrument beside them"
     )
-    doubts = [*coefficient_doubts(answer, open_channels or {}, laws), *more]
-    reasons = reasons_by_name(doubts)
-    marks = {}
-    for d in answer.fit.derivatives:
-        sharp = TRUSTED if d.share <= TRUST else CAREFUL
-        wide = USELESS if d.share > 1.0 else UNSURE
-        marks[d.name] = wide if d.flagged or d.name in reasons else sharp
+    reasons, marks = reasons_by_name(doubts), coefficient_marks(answer, doubts)
     lines = [
         *first_lines(heading, marks, FLAG_SHARE),
         *(f"  {remark}" for remark in answer.remarks),

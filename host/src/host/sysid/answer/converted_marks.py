@@ -27,7 +27,7 @@ def converted_marks(answer: Answer, marks: Mapping[str, str]) -> dict[str, str]:
     ----------
     answer : Answer
     marks : mapping
-        Of the derivatives, by `verdict_of`; a coefficient whose derivative has none has none.
+        Of the derivatives, by `judge`; a coefficient whose derivative has none has none.
     """
     found = {}
     for c in answer.coefficients:

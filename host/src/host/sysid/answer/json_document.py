@@ -13,8 +13,7 @@ from host.sysid.answer.converted_marks import converted_marks
 from host.sysid.answer.marks import Verdict
 from host.sysid.answer.servo_lines import servo_document
 from host.sysid.answer.settling_history import settling_document
-from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, unpredicted_states
-from host.sysid.answer.verdict import verdict_of
+from host.sysid.answer.trust_rules import unpredicted_states
 from host.sysid.coefficients.coefficient_fit import METHOD
 from host.sysid.flight.reconstructed_flight import maneuver_name
 from host.sysid.linear.linear_answer import Answer
@@ -79,14 +78,11 @@ def mode_document(modes: Sequence[Mode]) -> list[dict[str, Any]]:
     ]
 
 
-def answer_document(
-    answer: Answer, lines: Sequence[str], evidence: Evidence = NO_EVIDENCE
-) -> dict[str, Any]:
+def answer_document(answer: Answer, lines: Sequence[str], verdict: Verdict) -> dict[str, Any]:
     """Return one fitted model: verdict, estimates with intervals, modes, figures of fit."""
     result = answer.result
     half = result.half_width()
     A, B, C, D = result.matrices()
-    verdict = verdict_of(answer, evidence)
     converted = converted_marks(answer, verdict.marks)
     return {
         "template": answer.template,
@@ -224,9 +220,7 @@ def _repeats_document(found: ManeuverAgreement) -> dict[str, Any]:
     }
 
 
-def coefficient_document(
-    answer: CoefficientAnswer, lines: Sequence[str], evidence: Evidence = NO_EVIDENCE
-) -> dict[str, Any]:
+def coefficient_document(answer: CoefficientAnswer, verdict: Verdict) -> dict[str, Any]:
     """Return a direct fit of coefficients: verdict, values, modes, delays, instrument errors."""
     flight = answer.fit.condition
     return {
@@ -234,8 +228,8 @@ def coefficient_document(
         "model": answer.model.name,
         "terms": [name for name, _, _ in answer.model.named()],
         "method": METHOD,
-        "verdict": list(lines),
-        "marks": _mark_document(verdict_of(answer, evidence)),
+        "verdict": list(verdict.lines),
+        "marks": _mark_document(verdict),
         "airspeed_mps": flight.airspeed_mps,
         "qbar_pa": flight.qbar_pa,
         "alpha_rad": flight.alpha_rad,

@@ -22,7 +22,8 @@ from host.sysid.answer.marks import (
     share_text,
 )
 from host.sysid.answer.servo_lines import servo_lines
-from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, doubts_of, unpredicted
+from host.sysid.answer.trust_rules import unpredicted
+from host.sysid.checks.data_finding import Finding
 from host.sysid.errors.surface_motion import HELD_SURFACES
 from host.sysid.estimators.users_model import NOISE_CHOSEN
 from host.sysid.linear.linear_answer import Answer
@@ -32,21 +33,25 @@ PLACE = "imu_"  # begins the name of a sensor's place: no property of the aircra
 
 
 def linear_verdict(
-    answer: Answer, evidence: Evidence = NO_EVIDENCE, more: Sequence[Doubt] = ()
+    answer: Answer, doubts: Sequence[Doubt], findings: Sequence[Finding] = ()
 ) -> Verdict:
-    """Return the verdict on each parameter of a linear model, by the evidence given.
+    """Return the verdict on each parameter of a linear model.
 
-    `more` are doubts from outside the rules: what coefficients fitted directly say.
+    Parameters
+    ----------
+    answer : Answer
+    doubts : sequence of Doubt
+        All there are.
+    findings : sequence of Finding
+        Of the data checks.
     """
     count = len(answer.used)
     fitted = "1 maneuver fitted" if count == 1 else f"{count} maneuvers fitted jointly"
     heading = (
         f"{answer.template}: {fitted} by {answer.result.method}, {len(answer.held_out)} held out"
     )
-    shares = relative_half_widths(answer)
-    doubts = [*doubts_of(answer, evidence), *more]
-    reasons = reasons_by_name(doubts)
-    marks = _marks(answer, shares, reasons)
+    shares, reasons = relative_half_widths(answer), reasons_by_name(doubts)
+    marks = linear_marks(answer, doubts)
     lines = first_lines(heading, marks, FAIR)
     if not answer.result.converged:
         wrong = "  no convergence: estimates and intervals mean nothing, use another method"
@@ -55,7 +60,7 @@ def linear_verdict(
     lines += _doubt_lines(answer, doubts)
     lines += _identifiability_lines(answer)
     lines += [*_input_lines(answer), *servo_lines(answer)]
-    lines += combined_derivatives(answer, evidence.findings)
+    lines += combined_derivatives(answer, findings)
     lines += _data_lines(answer)
     return Verdict(heading, marks, tuple(lines), _all_reasons(answer, marks, shares, reasons))
 
@@ -70,16 +75,9 @@ def relative_half_widths(answer: Answer) -> dict[str, float]:
     }
 
 
-def not_relied_on(answer: Answer) -> set[str]:
-    """Return the parameters that the verdict does not let a reader use."""
-    marks = linear_verdict(answer).marks
-    return {name for name, mark in marks.items() if mark in (UNSURE, USELESS)}
-
-
-def _marks(
-    answer: Answer, shares: Mapping[str, float], reasons: Mapping[str, tuple[str, ...]]
-) -> dict[str, str]:
-    result = answer.result
+def linear_marks(answer: Answer, doubts: Sequence[Doubt]) -> dict[str, str]:
+    """Return the mark of each parameter by its interval and all doubts about it."""
+    result, shares, reasons = answer.result, relative_half_widths(answer), reasons_by_name(doubts)
     size = reference_values(answer.model, answer.maneuvers, result.estimate)
     flags = {r.name: r.grade for r in answer.identifiability_flags}
     marks = {}

@@ -13,6 +13,7 @@ from host.errors import IdentificationError
 from host.export.atomic_files import atomic_write, check_destination, file_names
 from host.extras import install_hint
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
+from host.sysid.answer.marks import Verdict
 from host.sysid.answer.mat_file import labels, write_answers
 from host.sysid.answer.settling_history import has_history, write_history
 from host.sysid.answer.simulator_forms import CONTROL, FORMS, files_of, form_of, write_form
@@ -121,6 +122,7 @@ def write_outputs(
     places: OutputPaths,
     answers: Sequence[Answer],
     direct: CoefficientAnswer | None,
+    verdicts: Sequence[Verdict],
     flights: Sequence[Mapping[str, Array]],
     truth: dict[str, Any] | None,
 ) -> list[Path]:
@@ -134,6 +136,8 @@ def write_outputs(
         Linear models.
     direct : CoefficientAnswer or None
         A direct fit of coefficients.
+    verdicts : sequence of Verdict
+        Of all, linear ones first.
     flights : sequence of mapping
         Columns of each, whose surfaces give the spectrum of the inputs.
     truth : dict or None
@@ -170,7 +174,7 @@ def write_outputs(
     if places.plots is not None:
         from host.sysid.answer.answer_figures import draw_all, save_all
 
-        written += save_all(draw_all(answers, direct, flights, truth), places.plots)
+        written += save_all(draw_all(answers, direct, verdicts, flights, truth), places.plots)
     return written
 
 

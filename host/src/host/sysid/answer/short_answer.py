@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from host.aircraft.gains import dimensional_name
 from host.constants import DEG_PER_RAD
 from host.sysid.answer.converted_marks import converted_marks
 from host.sysid.answer.estimate_lines import mode_lines
-from host.sysid.answer.marks import FAIR, SMALL, share_text
-from host.sysid.answer.trust_rules import Evidence
-from host.sysid.answer.verdict import verdict_of
+from host.sysid.answer.marks import FAIR, SMALL, Verdict, share_text
 from host.sysid.coefficients.coefficient_fit import FLAG_SHARE
 from host.sysid.linear.linear_answer import Answer
 from host.sysid.models.diagnostics import reference_values
@@ -44,23 +42,24 @@ def mode_summary(linear: Sequence[Answer], direct: CoefficientAnswer | None) -> 
 
 
 def short_table(
-    linear: Sequence[Answer], direct: CoefficientAnswer | None, evidence: Evidence
+    linear: Sequence[Answer], direct: CoefficientAnswer | None, verdicts: Sequence[Verdict]
 ) -> list[str]:
     """Return one table of at most `MOST_LINES` lines: every derivative, its coefficient beside."""
     heading = "estimate, 95 % half-width, its share, mark" + (
         "; its coefficient" if any(a.coefficients for a in linear) else ""
     )
-    rows = [row for answer in linear for row in _linear_rows(answer, evidence)]
+    both = zip(linear, verdicts, strict=False)
+    rows = [row for answer, verdict in both for row in _linear_rows(answer, verdict.marks)]
     if direct:
-        rows += list(_direct_rows(direct, evidence))
+        rows += list(_direct_rows(direct, verdicts[-1].marks))
     room = MOST_LINES - 1
     if len(rows) > room:
         rows = [*rows[: room - 1], f"  ... and {len(rows) - room + 1} more: --full"]
     return [heading, *rows]
 
 
-def _linear_rows(answer: Answer, evidence: Evidence) -> Iterator[str]:
-    result, marks = answer.result, verdict_of(answer, evidence).marks
+def _linear_rows(answer: Answer, marks: Mapping[str, str]) -> Iterator[str]:
+    result = answer.result
     half = result.half_width()
     size = reference_values(answer.model, answer.maneuvers, result.estimate)
     converted = converted_marks(answer, marks)
@@ -88,8 +87,7 @@ def _if_worse(mark: str, of_derivative: str) -> str:
     return "" if mark == of_derivative else f", {mark}"
 
 
-def _direct_rows(answer: CoefficientAnswer, evidence: Evidence) -> Iterator[str]:
-    marks = verdict_of(answer, evidence).marks
+def _direct_rows(answer: CoefficientAnswer, marks: Mapping[str, str]) -> Iterator[str]:
     for d in answer.fit.derivatives:
         yield _row(d.name, d.value, d.half_width, "", d.share, marks[d.name], "", FLAG_SHARE)
 

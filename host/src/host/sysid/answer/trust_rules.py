@@ -29,7 +29,7 @@ from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.validation.prediction_limits import FAILS, Prediction
 
 if TYPE_CHECKING:
-    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+    pass
 
 AIRSPEED = "airspeed_mps"
 WORSE_THAN_NONE = 1.0  # NRMSE: the mean would do better
@@ -53,19 +53,13 @@ class Evidence:
         All linear answers of the same data, this one among them.
     findings : tuple of Finding
         Of the data checks.
-    coefficients : CoefficientAnswer or None
-        Fitted directly to the same data.
     """
 
     beside: tuple[Answer, ...] = ()
     findings: tuple[Finding, ...] = ()
-    coefficients: CoefficientAnswer | None = None
 
 
-NO_EVIDENCE = Evidence()
-
-
-def doubts_of(answer: Answer, evidence: Evidence = NO_EVIDENCE) -> list[Doubt]:
+def doubts_of(answer: Answer, evidence: Evidence) -> list[Doubt]:
     """Return every doubt about the parameters of an answer, in the order of the rules."""
     return [one for rule in RULES for one in rule(answer, evidence)]
 

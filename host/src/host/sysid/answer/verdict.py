@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from host.sysid.answer.coefficient_verdict import coefficient_verdict
+from host.sysid.answer.coefficient_rules import coefficient_doubts
+from host.sysid.answer.coefficient_verdict import coefficient_marks, coefficient_verdict
 from host.sysid.answer.feedback_pairs import feedback_of
-from host.sysid.answer.linear_verdict import linear_verdict
+from host.sysid.answer.linear_verdict import linear_marks, linear_verdict
 from host.sysid.answer.marks import Verdict
 from host.sysid.answer.model_agreement import disagreements_of_models
-from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence
-from host.sysid.checks.data_finding import open_channels
+from host.sysid.answer.trust_rules import Evidence, doubts_of
+from host.sysid.checks.data_finding import Finding, open_channels
 from host.sysid.linear.linear_answer import Answer
 from host.sysid.reconstruction.sensor_corrections import correction_lines
 
@@ -19,45 +20,37 @@ if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 
 
-def verdict_of(answer: Answer | CoefficientAnswer, evidence: Evidence = NO_EVIDENCE) -> Verdict:
-    """Return the verdict of one answer, a linear model or coefficients fitted directly.
+def judge(
+    linear: Sequence[Answer],
+    coefficients: CoefficientAnswer | None = None,
+    findings: Sequence[Finding] = (),
+) -> tuple[Verdict, ...]:
+    """Return a verdict for each answer to the same data, those of linear models first.
+
+    Each answer is doubted by its rules, by the findings, and by what the others say.
 
     Parameters
     ----------
-    answer : Answer or CoefficientAnswer
-    evidence : Evidence, optional
-        What beside it speaks against it: other methods, findings of the data checks.
+    linear : sequence of Answer
+    coefficients : CoefficientAnswer, optional
+        Fitted directly.
+    findings : sequence of Finding
+        Of the data checks.
     """
-    direct, findings = evidence.coefficients, evidence.findings
-    if isinstance(answer, Answer):
-        own_verdict = linear_verdict(answer, evidence)
-        if direct is None:
-            return own_verdict
-        there = coefficient_verdict(direct, open_channels(findings), feedback_of(findings))
-        more = disagreements_of_models(answer, direct, own_verdict.marks, there.marks)[0]
-        return linear_verdict(answer, evidence, more) if more else own_verdict
-    checks = open_channels(findings), feedback_of(findings)
-    own_verdict = coefficient_verdict(answer, *checks)
-    doubts = [
-        doubt
-        for one in evidence.beside
-        for doubt in disagreements_of_models(
-            one, answer, linear_verdict(one, evidence).marks, own_verdict.marks
-        )[1]
-    ]
-    return coefficient_verdict(answer, *checks, doubts) if doubts else own_verdict
-
-
-def verdict_lines(
-    answers: Sequence[Answer | CoefficientAnswer],
-    notes: Sequence[str],
-    evidence: Evidence = NO_EVIDENCE,
-) -> list[str]:
-    """Return the verdict: notes first, then per model what to trust and what to re-fly."""
-    lines = [f"note: {note}" for note in notes]
-    for answer in answers:
-        lines += verdict_of(answer, evidence).lines
-    return lines
+    evidence = Evidence(tuple(linear), tuple(findings))
+    doubts = [doubts_of(answer, evidence) for answer in linear]
+    if coefficients is None:
+        return tuple(linear_verdict(a, d, findings) for a, d in zip(linear, doubts, strict=True))
+    direct = coefficient_doubts(coefficients, open_channels(findings), feedback_of(findings))
+    marks = coefficient_marks(coefficients, direct)
+    for answer, own in zip(linear, doubts, strict=True):
+        here, there = disagreements_of_models(
+            answer, coefficients, linear_marks(answer, own), marks
+        )
+        own += here
+        direct = [*direct, *there]
+    judged = (linear_verdict(a, d, findings) for a, d in zip(linear, doubts, strict=True))
+    return (*judged, coefficient_verdict(coefficients, direct))
 
 
 def removed_error_lines(answers: Sequence[Answer]) -> list[str]:

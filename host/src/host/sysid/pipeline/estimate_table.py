@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from host.sysid.answer.converted_marks import converted_marks
+from host.sysid.answer.marks import Verdict
 from host.sysid.answer.mat_file import labels
-from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence
-from host.sysid.answer.verdict import verdict_of
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 from host.sysid.linear.linear_answer import Answer
 from host.sysid.models.diagnostics import reference_values
@@ -30,7 +29,7 @@ NO_CAUSE = ("", 0.0)
 def estimate_table(
     linear: Sequence[Answer],
     direct: CoefficientAnswer | None,
-    evidence: Evidence = NO_EVIDENCE,
+    verdicts: Sequence[Verdict],
 ) -> pd.DataFrame:
     """Return every estimate, a row each: derivatives, delays, coefficients.
 
@@ -38,8 +37,8 @@ def estimate_table(
     ----------
     linear : sequence of Answer
     direct : CoefficientAnswer or None
-    evidence : Evidence, optional
-        What else the verdict counts.
+    verdicts : sequence of Verdict
+        Of each answer, linear ones first.
 
     Returns
     -------
@@ -51,10 +50,11 @@ def estimate_table(
         `widened_by` is what widens the interval most.
     """
     rows: dict[tuple[str, str], tuple[Any, ...]] = {}
-    for answer, label in zip(linear, labels(linear), strict=True):
-        rows |= {(label, name): row for name, row in _linear_rows(answer, evidence)}
+    for answer, label, verdict in zip(linear, labels(linear), verdicts, strict=False):
+        rows |= {(label, name): row for name, row in _linear_rows(answer, verdict.marks)}
     if direct:
-        rows |= {(direct.template, name): row for name, row in _direct_rows(direct, evidence)}
+        own = _direct_rows(direct, verdicts[-1].marks)
+        rows |= {(direct.template, name): row for name, row in own}
     return _frame(rows, ("model", "name"), COLUMNS)
 
 
@@ -68,8 +68,8 @@ def mode_table(linear: Sequence[Answer], direct: CoefficientAnswer | None) -> pd
     return _frame(rows, ("model", "mode"), MODE_COLUMNS)
 
 
-def _linear_rows(answer: Answer, evidence: Evidence) -> Iterator[tuple[str, tuple[Any, ...]]]:
-    result, marks = answer.result, verdict_of(answer, evidence).marks
+def _linear_rows(answer: Answer, marks: Mapping[str, str]) -> Iterator[tuple[str, tuple[Any, ...]]]:
+    result = answer.result
     half = result.half_width()
     size = reference_values(answer.model, answer.maneuvers, result.estimate)
     for k, p in enumerate(answer.model.parameters):
@@ -91,9 +91,8 @@ def _linear_rows(answer: Answer, evidence: Evidence) -> Iterator[tuple[str, tupl
 
 
 def _direct_rows(
-    answer: CoefficientAnswer, evidence: Evidence
+    answer: CoefficientAnswer, marks: Mapping[str, str]
 ) -> Iterator[tuple[str, tuple[Any, ...]]]:
-    marks = verdict_of(answer, evidence).marks
     for d in answer.fit.derivatives:
         cause = answer.causes.get(d.name, NO_CAUSE)[0]
         yield d.name, (d.value, d.half_width, PLAIN, d.share, marks[d.name], cause)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,13 +13,13 @@ from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.answer_figures import draw_all
 from host.sysid.answer.estimate_lines import coefficient_lines, model_lines
 from host.sysid.answer.json_document import answer_document, coefficient_document, json_text
+from host.sysid.answer.marks import Verdict
 from host.sysid.answer.method_comparison import method_table
 from host.sysid.answer.output_files import OutputPaths, check_outputs, write_outputs
 from host.sysid.answer.prior_comparison import prior_document, prior_lines
 from host.sysid.answer.short_answer import MOST_LINES, REST, mode_summary, short_table
-from host.sysid.answer.trust_rules import Evidence
 from host.sysid.answer.truth_comparison import truth_document, truth_report_lines
-from host.sysid.answer.verdict import removed_error_lines, verdict_lines
+from host.sysid.answer.verdict import judge, removed_error_lines
 from host.sysid.checks.data_finding import Finding, finding_document
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
@@ -82,7 +83,7 @@ class Identification:
 
         A table of the caller's own: what is written into it changes no answer.
         """
-        return estimate_table(self.linear, self.coefficients, self.evidence)
+        return estimate_table(self.linear, self.coefficients, self.verdicts)
 
     @property
     def modes(self) -> pd.DataFrame:
@@ -98,15 +99,14 @@ class Identification:
     def judgement(self) -> tuple[str, ...]:
         """Lines on what to trust, what not and why, and what to fly again."""
         # What the log lost is a note, and nothing that was read of it may be said before.
-        said = verdict_lines((), self.notes)
+        said = (f"note: {note}" for note in self.notes)
         found = (finding.line for finding in self.findings)
-        judged = verdict_lines(self.answers, (), self.evidence)
-        return (*said, *found, *judged)
+        return (*said, *found, *(line for verdict in self.verdicts for line in verdict.lines))
 
-    @property
-    def evidence(self) -> Evidence:
-        """What the verdict counts beside each answer: other methods, findings of the checks."""
-        return Evidence(self.linear, self.findings, self.coefficients)
+    @cached_property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """The verdict on each of `answers`, made once for every form of output."""
+        return judge(self.linear, self.coefficients, self.findings)
 
     @property
     def answers(self) -> tuple[Answer | CoefficientAnswer, ...]:
@@ -128,7 +128,8 @@ class Identification:
             If matplotlib is missing.
         """
         recorded = [flight.recorded for flight in self.flights]
-        return Pictures(draw_all(self.linear, self.coefficients, recorded, self.truth))
+        made = self.linear, self.coefficients, self.verdicts
+        return Pictures(draw_all(*made, recorded, self.truth))
 
     def simulate(
         self,
@@ -175,17 +176,13 @@ class Identification:
 
     def document(self) -> dict[str, Any]:
         """Return everything as plain lists, numbers and strings; several flights are lists."""
-        direct, evidence = self.coefficients, self.evidence
+        direct = self.coefficients
         documents = [
-            answer_document(
-                a, verdict_lines([a], [], evidence) + removed_error_lines([a]), evidence
-            )
-            for a in self.linear
+            answer_document(answer, (*verdict.lines, *removed_error_lines([answer])), verdict)
+            for answer, verdict in zip(self.linear, self.verdicts, strict=False)
         ]
         if direct:
-            documents.append(
-                coefficient_document(direct, verdict_lines([direct], [], evidence), evidence)
-            )
+            documents.append(coefficient_document(direct, self.verdicts[-1]))
         sources = [flight.source for flight in self.flights]
         agreements = [compatibility_document(a) if a else None for a in self.agreements]
         one = len(sources) == 1
@@ -232,7 +229,7 @@ class Identification:
             if len(table) > MOST_LINES:
                 table = [*table[: MOST_LINES - 1], "  ... and more: --full"]
         else:
-            table = short_table(self.linear, self.coefficients, self.evidence)
+            table = short_table(self.linear, self.coefficients, self.verdicts)
         return [*modes, "", *table, REST]
 
     def _numbers(self, width: int) -> list[str]:
@@ -260,7 +257,9 @@ class Identification:
         """
         check_outputs(places)
         recorded = [flight.recorded for flight in self.flights]
-        return write_outputs(places, self.linear, self.coefficients, recorded, self.truth)
+        return write_outputs(
+            places, self.linear, self.coefficients, self.verdicts, recorded, self.truth
+        )
 
     def __str__(self) -> str:
         """Return the text that `host identify` prints."""
