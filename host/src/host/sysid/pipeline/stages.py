@@ -139,20 +139,20 @@ def identify(
     kept, each = joined_stretches(sources, each)
     true_files = _truth_files(truth, len(sources), kept)
     sources = [sources[number] for number in kept]
-    true = _truth(true_files, len(sources))
     known = {
         made_by: aircraft_data(aircraft, made_by) if aircraft is not None else None
         for made_by in dict.fromkeys(how.calibration for how in each)
     }
     stage("reconstructing the flight")
+    read = [
+        read_flight(source, how, known[how.calibration])
+        for source, how in zip(sources, each, strict=True)
+    ]
     return identify_columns(
-        [
-            read_flight(source, how, known[how.calibration])
-            for source, how in zip(sources, each, strict=True)
-        ],
+        read,
         models=asked,
         methods=by,
-        truth=true,
+        truth=_truth(true_files, len(read)),
         prior=prior,
         method_options=options,
     )
