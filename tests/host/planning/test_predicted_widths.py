@@ -11,9 +11,9 @@ import pytest
 from host.cli import main
 from host.errors import UsageError
 from host.export.toml import dumps
-from host.planning import predicted_widths
 from host.planning.point_widths import PointPromise, promise_points
 from host.planning.predicted_widths import Prediction, predict_widths
+from host.sysid.pipeline import flight_preparation
 from host.sysid.reconstruction.reconstruction import Compatibility, reconstruct
 from host.twin.testcard.cards import Card, parse
 
@@ -46,7 +46,7 @@ def promised(card: Card, agreements: list[Compatibility]) -> Prediction:
         return agreements[-1]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(predicted_widths, "reconstruct", watched)
+        patch.setattr(flight_preparation, "reconstruct", watched)
         return predict_widths(card, 0.3, flights=1)
 
 
