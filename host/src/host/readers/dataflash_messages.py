@@ -29,6 +29,7 @@ WANTED: dict[str, tuple[str, ...]] = {
     "MSG": ("TimeUS", "TimeMS", "Message"), "VER": ("FWS",), "VIBE": (), "DSF": ("Dp",),
     "MODE": ("TimeUS", "TimeMS", "ModeNum"), "SIDD": ("TimeUS",), "ATRP": ("TimeUS",),
 }  # fmt: skip
+TEXTS = {("PARM", "Name"), ("MSG", "Message"), ("VER", "FWS")}
 STAMPS = ("TimeUS", "TimeMS")
 # The field that numbers the instances of a kind, in the releases that have one.
 INSTANCE = {"IMU": "I", "ARSP": "I", "BARO": "I", "GPS": "I", "VIBE": "IMU", "XKF1": "C"}
@@ -54,7 +55,8 @@ def read_dataflash(path: Path, *, text: bool) -> AutopilotLog:
         If it holds no record.
     """
     damage: list[str] = []
-    tables, lost = _text(path, damage) if text else _binary(path, damage)
+    found, lost = _text(path, damage) if text else _binary(path, damage)
+    tables = {name: _of_their_kind(name, fields) for name, fields in found.items()}
     if not any(len(next(iter(t.values()), ())) for t in tables.values()):
         raise NotAutopilotLogError(
             f"{path}: begins as a DataFlash log but holds no whole record; is it cut?"
@@ -79,6 +81,15 @@ def read_dataflash(path: Path, *, text: bool) -> AutopilotLog:
         lost=lost,
         texts=tuple(texts),
     )
+
+
+def _of_their_kind(name: str, fields: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Return the fields that are what they are read as: a log's own FMT may say otherwise."""
+    return {
+        column: values
+        for column, values in fields.items()
+        if values.ndim == 1 and (values.dtype.kind in "fiub") != ((name, column) in TEXTS)
+    }
 
 
 def _binary(path: Path, damage: list[str]) -> tuple[dict[str, dict[str, NDArray[Any]]], int]:
