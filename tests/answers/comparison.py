@@ -16,6 +16,9 @@ from tests.answers.answer_record import Record
 STRICT, DEFAULT = 1e-9, 1e-2
 DERIVED = 10.0  # tolerances that a function of many estimates may move
 ROUNDING = 1e-12  # of a value, where it has no width
+# Half-width, in SI and radian, of what the data say nothing about: how wide it is, is rounding.
+# Sideslip that no vane measured leaves the constants of a maneuver at 3e4 rad.
+UNKNOWN = 1e3
 MARK_LIMITS = (0.1, 0.12, 0.3)  # half-width over value, where marks change (IDENTIFY.md)
 # A number, not a digit of a name (v2_rad) or of a kind of input (3-2-1-1).
 NUMBER = re.compile(r"(?<![\w.-])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w-]|\.\d)")
@@ -50,8 +53,9 @@ def _of_answer(
 ) -> Iterator[str]:
     estimates, others = old["estimates"], new["estimates"]
     yield from _names("estimates", estimates, others)
+    unknown = {n for n, was in estimates.items() if _unknown(was) and _unknown(others.get(n, was))}
     for name in estimates:
-        if name in others:
+        if name in others and name not in unknown:
             yield from _estimate(name, estimates[name], others[name], tolerance)
     yield from _names("modes", old["modes"], new["modes"])
     for name in old["modes"]:
@@ -68,11 +72,17 @@ def _of_answer(
                 yield f"{name} {was:.9g} -> {now:.9g}"
         elif was is not now:
             yield f"{name} {was} -> {now}"
-    yield from _correlations(old["correlation"], new["correlation"], tolerance)
+    left_out = {k for k, name in enumerate(estimates) if name in unknown}
+    yield from _correlations(old["correlation"], new["correlation"], tolerance, left_out)
     yield from _marks("marks", old["marks"], new["marks"], at_limit)
     for name in old["reasons"]:
         yield from _texts(f"reasons of {name}", old["reasons"][name], new["reasons"].get(name, []))
-    for key in ("causes", "template", "model", "method", "converged", "residual_kind", "at_bound",
+    # Places of CG and IMU move an arm alike: rounding says which of the two is the larger cause.
+    for name in {*old["causes"], *new["causes"]} - unknown if tolerance <= STRICT else ():
+        was, now = old["causes"].get(name), new["causes"].get(name)
+        if was != now:
+            yield f"cause of {name}: {was} -> {now}"
+    for key in ("template", "model", "method", "converged", "residual_kind", "at_bound",
                 "unpredicted", "constant_inputs", "maneuvers", "held_out", "refused"):  # fmt: skip
         if old.get(key) != new.get(key):
             yield f"{key}: {old.get(key)} -> {new.get(key)}"
@@ -97,14 +107,22 @@ def _estimate(name: str, old: list[Any], new: list[Any], tolerance: float) -> It
         yield f"{name} half-width {half:.9g} -> {other:.9g}, by {abs(other / half - 1):.2g} of it"
 
 
+def _unknown(estimate: list[Any]) -> bool:
+    return estimate[1] is not None and estimate[1] > UNKNOWN
+
+
 def _correlations(
-    old: list[list[float]], new: list[list[float]], tolerance: float
+    old: list[list[float]], new: list[list[float]], tolerance: float, left_out: set[int]
 ) -> Iterator[str]:
+    """Compare the rows below the diagonal, but for those of parameters that are unknown."""
     if [len(row) for row in old] != [len(row) for row in new]:
         yield f"covariance of {len(old)} parameters -> {len(new)}"
         return
     off = [
-        abs(a - b) for was, now in zip(old, new, strict=True) for a, b in zip(was, now, strict=True)
+        abs(a - b)
+        for k, (was, now) in enumerate(zip(old, new, strict=True))
+        for j, (a, b) in enumerate(zip(was, now, strict=True))
+        if not {k, j} & left_out
     ]
     if max(off, default=0.0) > DERIVED * tolerance:
         yield f"correlations by {max(off):.2g}"

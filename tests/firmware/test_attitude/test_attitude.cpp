@@ -181,6 +181,38 @@ TEST_CASE("a coordinated turn at 60 deg does not pull it level when the speed is
 }
 
 TEST_CASE(
+    "a minute of turning at 30 deg is learned from where the speed is known, else not at all") {
+  // 18 m/s: g tan(30) / V = 0.3145 rad/s, 25 deg/s of q and r together: between the 16 deg/s up to
+  // which something is learned without a speed and the 62 with one.
+  const uint16_t speeds_cmps[] = {0, 1800};
+  for (const uint16_t speed_cmps : speeds_cmps) {
+    Filter filter;
+    filter.in.force[1] = -4096;
+    filter.in.force[2] = -7094;
+    filter.run(Attitude::kSettleSteps);
+    filter.in.rates[1] = 590;
+    filter.in.rates[2] = 1022;
+    filter.in.force[1] = 0;
+    filter.in.force[2] = -9459;
+    for (uint8_t second = 0; second < 60; ++second) {
+      if (speed_cmps != 0) filter.attitude.set_speed(speed_cmps);
+      filter.run(200);
+    }
+    CHECK(off(filter.attitude.phi_cdeg(), 3000) <= 60);
+    CHECK(off(filter.attitude.theta_cdeg(), 0) <= 60);
+    // A bank that is 5 deg wrong is put right by gravity, which only the known speed lays open.
+    filter.in.rates[0] = 1638;
+    filter.run(40);
+    filter.in.rates[0] = 0;
+    for (uint8_t second = 0; second < 60; ++second) {
+      if (speed_cmps != 0) filter.attitude.set_speed(speed_cmps);
+      filter.run(200);
+    }
+    CHECK_EQ(off(filter.attitude.phi_cdeg(), 3000) <= 150, speed_cmps != 0);
+  }
+}
+
+TEST_CASE(
     "a saturated gyro makes the attitude invalid for ten seconds, a saturated accelerometer not") {
   Filter filter;
   filter.run(Attitude::kSettleSteps);

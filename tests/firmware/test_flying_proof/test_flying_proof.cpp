@@ -102,6 +102,19 @@ TEST_CASE("a zero is within the sensor's band, of a pitot that is neither open n
   CHECK(!open.run(6000));
 }
 
+TEST_CASE("the zero is that of the pitot which the card watches") {
+  for (uint8_t b = 0; b < 2; ++b) {
+    Bench bench;
+    bench.in.pitot[b] = kZero;
+    bench.in.pitot[1 - b] = kZero - 100;
+    bench.proof.tare(static_cast<uint8_t>(4 + b), 0, bench.in, bench.now_us);
+    bench.in.pitot[b] = kLeast - 1;
+    CHECK(!bench.run(6000));
+    bench.in.pitot[b] = kLeast;
+    CHECK(bench.run(6000));
+  }
+}
+
 TEST_CASE("a reading that is open or old proves nothing") {
   Bench bench;
   bench.in.pitot[0] = 3000;

@@ -234,6 +234,8 @@ TEST_CASE("until every part has been looked at nothing holds") {
   core::InputWatch watch;
   watch.limits.distance_max_m = 300;
   watch.start(5);
+  CHECK_EQ(static_cast<int>(watch.found[core::InputWatch::kGps]),
+           static_cast<int>(InputEnd::kSensorLost));
   for (InputEnd& part : watch.found) {
     CHECK_EQ(static_cast<int>(watch.outside()), static_cast<int>(InputEnd::kSensorLost));
     part = InputEnd::kDone;
