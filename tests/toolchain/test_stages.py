@@ -80,7 +80,7 @@ def test_a_case_is_listed_with_its_childs_processor_time_and_what_it_shares(
     subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
     (first_s, first), (second_s, second) = runner.slowest_cases([report])
     assert first.endswith("test_first")
-    assert 0.7 < first_s < 1.5
+    assert 0.65 < first_s < 1.5  # seconds are reported by tenths
     assert second.endswith("test_second")
     assert second_s < 0.1
 
