@@ -13,7 +13,8 @@ from host.physical.calibration import Calibration, calibration_of_text
 from host.preflight.check import State
 from host.preflight.check_list import CheckListInputs
 from host.preflight.guided_list import Preflight
-from host.twin.ground.ground_faults import GROUND_FAULTS, GroundFault, broken_walk
+from host.twin.ground.ground_fault import GroundFault
+from host.twin.ground.ground_faults import GROUND_FAULTS, broken_walk
 from host.twin.ground.ground_instrument import START_US, GroundFrames, ground_frames
 from host.twin.ground.ground_walk import STEP_S, GroundWalk, ground_walk
 from host.twin.outcome.virtual_calibration import calibration

@@ -10,7 +10,8 @@ from host.aircraft.file import Aircraft
 from host.errors import UsageError
 from host.live.live_sources import SPEED, Tell, silence
 from host.near_names import like
-from host.twin.ground.ground_faults import GROUND_FAULTS, GroundFault, broken_walk
+from host.twin.ground.ground_fault import GroundFault
+from host.twin.ground.ground_faults import GROUND_FAULTS, broken_walk
 from host.twin.ground.ground_instrument import START_US, ground_frames
 from host.twin.ground.ground_walk import STEP_S, ground_walk
 from host.twin.outcome.virtual_calibration import calibration
