@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from host.aircraft import handbook
 from host.errors import UsageError
 from host.files.toml_reader import listed, number
 
@@ -62,8 +63,6 @@ def from_dimensions(
     UsageError
         As `error`: a dimension is missing, none, or out of its range, in one line.
     """
-    from host.aircraft import handbook
-
     missing = [key for key in (*_RANGES, "motor_power_w") if key not in document]
     if missing:
         raise error(

@@ -23,7 +23,6 @@ import numpy as np
 
 from host.aircraft import usual_servo
 from host.aircraft.airframe import COEFFICIENTS, Array
-from host.aircraft.file import FOLDER
 from host.constants import GRAVITY_MPS2
 from host.export.toml import dumps
 
@@ -364,7 +363,7 @@ def main(arguments: list[str]) -> int:
     """
     stale = []
     for source in sorted(DIMENSIONS.glob("*.toml")):
-        target = FOLDER / source.name
+        target = DIMENSIONS.with_name("airframes") / source.name
         text = generate(source)
         if "--check" in arguments:
             if not target.is_file() or target.read_text(encoding="utf-8") != text:

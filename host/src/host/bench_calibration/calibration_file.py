@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,8 +13,8 @@ from host.bench_calibration.bench_plan import Subject
 from host.bench_calibration.calibrated_lines import Calibrated
 from host.bench_calibration.line_fit import LineFit
 from host.errors import CalibrationError
+from host.export.atomic_files import atomic_write
 from host.export.toml import dumps
-from host.export.unfinished import unfinished
 from host.files.user_text import read_toml
 from host.physical.calibration import FORMAT, VERSION, load_calibration
 
@@ -103,7 +102,9 @@ def write_lines(path: Path, subject: Subject, tables: Mapping[str, Any], made: M
     Raises
     ------
     CalibrationError
-        If the file there is none, or it cannot be written.
+        If the file there is none.
+    UsageError
+        If it cannot be written.
     """
     document: dict[str, Any] = {"format": FORMAT, "version": VERSION}
     if path.exists():
@@ -117,17 +118,9 @@ def write_lines(path: Path, subject: Subject, tables: Mapping[str, Any], made: M
     document[subject.table] = {**document.get(subject.table, {}), **tables}
     head = {k: v for k, v in document.items() if not isinstance(v, dict)}
     rest = {k: v for k, v in document.items() if isinstance(v, dict)}
-    part = unfinished(path)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_write(path) as part:
         part.write_text(dumps(head | rest), encoding="utf-8")
         load_calibration(part)
-        part.replace(path)
-    except OSError as error:
-        raise CalibrationError(f"{path}: cannot be written: {error.strerror or error}") from None
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
 
 
 def _short(value: float, digits: int = 6) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +11,7 @@ import numpy as np
 from host.bench_calibration.bench_plan import Subject
 from host.bench_calibration.calibrated_lines import Calibrated
 from host.bench_calibration.line_fit import LineFit
-from host.errors import UsageError
-from host.export.unfinished import unfinished
+from host.export.atomic_files import atomic_write
 
 _COLOURS = ("#0b5cad", "#c2410c", "#15803d", "#7e22ce", "#64748b")
 _MARKS = {1: "^", -1: "v", 0: "o"}
@@ -48,16 +46,12 @@ def draw_picture(subject: Subject, lines: Sequence[Calibrated], target: Path) ->
             _draw(subject, fit, doubt, axes[0, column], axes[1, column])
             if column == 0:
                 _legend(fit, axes[0, 0])
-        part = unfinished(target)
         try:
-            figure.savefig(part, format="svg", metadata={"Date": None, "Creator": "host calibrate"})
-            part.replace(target)
-        except OSError as error:
-            raise UsageError(f"{target}: cannot be written: {error.strerror or error}") from None
+            with atomic_write(target) as part:
+                metadata = {"Date": None, "Creator": "host calibrate"}
+                figure.savefig(part, format="svg", metadata=metadata)
         finally:
             plt.close(figure)
-            with suppress(OSError):
-                part.unlink(missing_ok=True)
 
 
 def _legend(fit: LineFit, axis: Any) -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,8 +11,8 @@ from numpy.typing import NDArray
 
 from host.errors import UsageError
 from host.export import FORMATS, open_writer
+from host.export.atomic_files import blamed_on, unfinished
 from host.export.csv import STDOUT, printable
-from host.export.unfinished import unfinished
 from host.export.writer import Columns, Meta
 from host.log import FlightLog
 
@@ -70,7 +68,7 @@ def destination(request: Request, source: Path) -> tuple[str, Path]:
             target = named.with_name(f"{named.name}.{kind}")
     if target.exists() and target.samefile(source):
         raise UsageError(f"{target} is the source itself; name another file with -o")
-    with _blamed_on(target):
+    with blamed_on(_named(target)):
         target.parent.mkdir(parents=True, exist_ok=True)
     return kind, target
 
@@ -86,43 +84,33 @@ def write_table(pieces: Iterable[Columns], kind: str, target: Path, meta: Meta) 
     plain = target != STDOUT
     part = unfinished(target) if plain else target
     try:
-        with _blamed_on(target):
+        with blamed_on(_named(target)):
             writer = open_writer(kind, part, meta)
         try:
             for piece in pieces:
-                with _blamed_on(target):
+                with blamed_on(_named(target)):
                     writer.write(piece)
         finally:
-            with _blamed_on(target):
+            with blamed_on(_named(target)):
                 writer.close()
         if plain:
-            with _blamed_on(target):
+            with blamed_on(_named(target)):
                 part.replace(target)
     finally:
         if plain:
             part.unlink(missing_ok=True)
 
 
-@contextmanager
-def _blamed_on(target: Path) -> Iterator[None]:
-    """Turn an error of the system into one that names the file the user asked for."""
-    try:
-        yield
-    except BrokenPipeError:  # the reader of our output left; not an error
-        raise
-    except OSError as error:
-        name = "standard output" if target == STDOUT else target
-        why = os.strerror(error.errno) if error.errno else error
-        raise UsageError(
-            f"{name}: cannot be written: {why}; make room or name another place with -o"
-        ) from error
+def _named(target: Path) -> Path | str:
+    """Return what messages call the place."""
+    return "standard output" if target == STDOUT else target
 
 
 def write_frames(log: FlightLog, kind: str, target: Path) -> list[str]:
     """Write every kind of raw frame to a file of its own; return the files."""
     beside = Path(log.path.name) if target == STDOUT else target
     folder = beside.with_suffix(".frames")
-    with _blamed_on(folder):
+    with blamed_on(folder):
         folder.mkdir(parents=True, exist_ok=True)
     files = []
     for name, frame in log.schema.by_name.items():

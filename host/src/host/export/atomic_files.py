@@ -1,4 +1,4 @@
-"""Files of an answer: whole under their own name or not there, and errors that name them."""
+"""Files that are whole under their own name or not there, and errors that name them."""
 
 from __future__ import annotations
 
@@ -8,10 +8,37 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from host.errors import IdentificationError
-from host.export.unfinished import unfinished
+from host.errors import UsageError
 
 LONGEST_NAME = 100  # characters; file systems take 255 bytes
+
+
+def unfinished(path: Path) -> Path:
+    """Return a name beside `path`, with its ending.
+
+    The process is in it, so that it is no file of the user's, nor another run's.
+    """
+    return path.with_name(f"{path.stem}.part{os.getpid()}{path.suffix}")
+
+
+@contextmanager
+def blamed_on(target: Path | str) -> Iterator[None]:
+    """Turn an error of the system into one that names the file the user asked for.
+
+    Raises
+    ------
+    UsageError
+        If the system says that the file cannot be written, or that there is no room.
+    """
+    try:
+        yield
+    except BrokenPipeError:  # the reader of our output left; not an error
+        raise
+    except OSError as error:
+        why = os.strerror(error.errno) if error.errno else error
+        raise UsageError(
+            f"{target}: cannot be written: {why}; make room or name another place"
+        ) from error
 
 
 @contextmanager
@@ -28,23 +55,17 @@ def atomic_write(path: Path) -> Iterator[Path]:
 
     Raises
     ------
-    IdentificationError
+    UsageError
         If it cannot be written, or there is no room.
     """
     plain = path.is_file() or not path.exists()
     part = unfinished(path) if plain else path
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        yield part
-        if plain:
-            part.replace(path)
-    except BrokenPipeError:  # the reader of our output left; not an error
-        raise
-    except OSError as error:
-        why = os.strerror(error.errno) if error.errno else error
-        raise IdentificationError(
-            f"{path}: cannot be written: {why}; make room or name another place"
-        ) from error
+        with blamed_on(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            yield part
+            if plain:
+                part.replace(path)
     finally:
         if plain:
             with suppress(OSError):  # whatever is wrong with the place is said already
@@ -64,20 +85,20 @@ def check_destination(called: str, path: Path, *, folder: bool) -> None:
 
     Raises
     ------
-    IdentificationError
+    UsageError
         If it cannot.
     """
     if folder and path.exists() and not path.is_dir():
-        raise IdentificationError(f"{called} {path}: a file; name a folder")
+        raise UsageError(f"{called} {path}: a file; name a folder")
     if not folder and path.is_dir():
-        raise IdentificationError(f"{called} {path}: a folder; name a file in it")
+        raise UsageError(f"{called} {path}: a folder; name a file in it")
     above = next(p for p in (path, *path.absolute().parents) if p.exists())
     if above != path and not above.is_dir():
-        raise IdentificationError(f"{called} {path}: {above} is a file, no folder can be in it")
+        raise UsageError(f"{called} {path}: {above} is a file, no folder can be in it")
     # A file there before is replaced: that is written to its folder.
     for place in (above, above.parent) if above.is_file() else (above,):
         if not os.access(place, os.W_OK):
-            raise IdentificationError(f"{called} {path}: no permission to write to {place}")
+            raise UsageError(f"{called} {path}: no permission to write to {place}")
 
 
 def file_names(labels: Iterable[str]) -> list[str]:

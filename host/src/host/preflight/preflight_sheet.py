@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from host.errors import UsageError
+from host.export.atomic_files import atomic_write
 from host.export.toml import dumps
 from host.files.user_text import parse_toml, read_text, read_toml
 from host.live.live_program import Join
@@ -91,10 +92,8 @@ def write_sheet(path: Path, document: dict[str, Any]) -> None:
     UsageError
         If it cannot be written.
     """
-    try:
-        path.write_text(dumps(document), encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"{path}: cannot be written: {error.strerror or error}") from None
+    with atomic_write(path) as part:
+        part.write_text(dumps(document), encoding="utf-8")
 
 
 def sheet_beside(log: Path) -> Path | None:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from host.errors import ExitCode, UsageError
+from host.export.atomic_files import atomic_write
 from host.export.gpx_writer import write_gpx
 from host.export.kml_writer import write_kml
-from host.export.unfinished import unfinished
 from host.extras import install_hint
 from host.report.flight_geography import flight_geography
 from host.report.flight_mcap import write_flight_mcap
@@ -17,7 +17,6 @@ from host.report.flight_reading import FlightRequest, read_flight
 from host.report.flight_tlog import write_flight_tlog
 from host.report.flight_ulog import write_flight_ulog
 from host.report.plotjuggler_layout import PREFIX, write_layout
-from host.report.plotting import blamed_on
 from host.report.shown_flight import ShownFlight
 
 ENDINGS = {"tlog": ".tlog", "ulog": ".ulg", "kml": ".kml", "kmz": ".kmz", "gpx": ".gpx",
@@ -55,8 +54,8 @@ def export(request: ExportRequest) -> tuple[list[Path], list[str], ExitCode]:
         files.append(target)
         if kind in PREFIX:
             layout = target.with_name(f"{target.stem}.{kind}.plotjuggler.xml")
-            with blamed_on(layout):
-                write_layout(flight, layout, kind)
+            with atomic_write(layout) as part:
+                write_layout(flight, part, kind)
             files.append(layout)
     said = list(flight.notes)
     if flight.utc_s is None and set(request.kinds) - {"ulog"}:
@@ -94,14 +93,9 @@ def _write(kind: str, flight: ShownFlight, target: Path, rate_hz: float | None) 
         "gpx": lambda part: write_gpx(part, flight_geography(flight)),
         "mcap": lambda part: write_flight_mcap(flight, part),
     }
-    part = unfinished(target)
-    with blamed_on(target):
-        target.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_write(target) as part:
         try:
             makers[kind](part)
-            part.replace(target)
         except ModuleNotFoundError as error:
             name = (error.name or "").split(".")[0]
             raise UsageError(f"--to {kind} needs {name}: {install_hint(name)}") from None
-        finally:
-            part.unlink(missing_ok=True)

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from host.errors import ExitCode, UsageError
-from host.export.unfinished import unfinished
+from host.export.atomic_files import atomic_write
 from host.report.flight_page import flight_page
 from host.report.flight_reading import FlightRequest, read_flight
+from host.report.strip_figure import write_figure
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,12 +43,9 @@ def plot(request: PlotRequest) -> Plotted:
     """
     flight, source = read_flight(request.wanted)
     files: list[Path] = []
-    if request.pictures:
-        from host.report.strip_figure import write_figure
-
-        for path in request.pictures:
-            write_figure(flight, path, request.channels, request.span)
-            files.append(path)
+    for path in request.pictures:
+        write_figure(flight, path, request.channels, request.span)
+        files.append(path)
     if request.output is not None or not request.pictures:
         target = page_file(request.output, source)
         write_text(target, flight_page(flight, full=request.full))
@@ -82,23 +77,5 @@ def write_text(target: Path, text: str) -> None:
     UsageError
         If the place cannot be written to.
     """
-    part = unfinished(target)
-    with blamed_on(target):
-        target.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            part.write_text(text, encoding="utf-8", newline="\n")
-            part.replace(target)
-        finally:
-            part.unlink(missing_ok=True)
-
-
-@contextmanager
-def blamed_on(target: Path) -> Iterator[None]:
-    """Turn an error of the system into one that names the file the user asked for."""
-    try:
-        yield
-    except OSError as error:
-        why = os.strerror(error.errno) if error.errno else error
-        raise UsageError(
-            f"{target}: cannot be written: {why}; make room or name another place with -o"
-        ) from error
+    with atomic_write(target) as part:
+        part.write_text(text, encoding="utf-8", newline="\n")

@@ -7,12 +7,11 @@ from typing import Any
 
 from host.arrays import Array
 from host.errors import UsageError
-from host.export.unfinished import unfinished
+from host.export.atomic_files import atomic_write
 from host.extras import install_hint
 from host.near_names import like
 from host.report.channel_list import Channel, channels_of
 from host.report.overview import buckets, min_max
-from host.report.plotting import blamed_on
 from host.report.shown_flight import ShownFlight, quality
 from host.report.strip_list import strips_of
 
@@ -60,15 +59,11 @@ def write_figure(
             f" {flight.t_s[0]:.2f} to {flight.t_s[-1]:.2f} s"
         )
     mpl = _matplotlib()
-    part = unfinished(target)
-    with blamed_on(target), mpl.rc_context({"svg.hashsalt": "host", "font.size": 8}):
+    with mpl.rc_context({"svg.hashsalt": "host", "font.size": 8}):
         figure = _strip_axes(flight, strips, inside)
-        try:
-            metadata = {"Date": None} if ending == "svg" else {"Software": None}
+        metadata = {"Date": None} if ending == "svg" else {"Software": None}
+        with atomic_write(target) as part:
             figure.savefig(part, format=ending, dpi=200, metadata=metadata)
-            part.replace(target)
-        finally:
-            part.unlink(missing_ok=True)
 
 
 def overview_figure(flight: ShownFlight) -> Any:

@@ -106,13 +106,13 @@ def run(args: argparse.Namespace) -> int:
     """Identify and print the answer; messages name options where the library names arguments."""
     # The matrices are small: threads of BLAS only wait for each other (28 s against 5 measured).
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from host.errors import IdentificationError
+    from host.errors import UsageError
     from host.sysid.pipeline.arguments import option_words
 
     try:
         return _run(args)
-    except IdentificationError as error:
-        raise IdentificationError(option_words(str(error))) from error
+    except UsageError as error:
+        raise UsageError(option_words(str(error))) from error
 
 
 def _run(args: argparse.Namespace) -> int:

@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     """Predict and print; messages name options where the library names arguments."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.aircraft.origin import announce_aircraft
-    from host.errors import ExitCode, IdentificationError
+    from host.errors import ExitCode, IdentificationError, UsageError
     from host.readers.autopilot_flight import chosen_sensors
     from host.readers.shipped_maps import LIST, map_lines
     from host.sysid.answer import OutputPaths, check_outputs
@@ -94,8 +94,8 @@ def run(args: argparse.Namespace) -> int:
                 f"wrote {len(written)} picture{'s' * (len(written) > 1)} in {args.plots}",
                 file=sys.stderr,
             )
-    except IdentificationError as error:
-        raise IdentificationError(option_words(str(error))) from error
+    except UsageError as error:
+        raise UsageError(option_words(str(error))) from error
     return int(ExitCode.OK)
 
 

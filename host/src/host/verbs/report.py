@@ -107,7 +107,7 @@ def run(args: argparse.Namespace) -> int:
     # The matrices are small: threads of BLAS only wait for each other (28 s against 5 measured).
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.aircraft.origin import announce_aircraft
-    from host.errors import ExitCode, IdentificationError
+    from host.errors import ExitCode, UsageError
     from host.readers.autopilot_flight import chosen_sensors
     from host.report.reporting import ReportRequest, write_report
     from host.sysid.pipeline.arguments import option_words
@@ -142,8 +142,8 @@ def run(args: argparse.Namespace) -> int:
     )
     try:
         target, found = write_report(request)
-    except IdentificationError as error:
-        raise IdentificationError(option_words(str(error))) from error
+    except UsageError as error:
+        raise UsageError(option_words(str(error))) from error
     announce_aircraft([args.aircraft])
     print(found.to_json() if args.json else option_words("\n".join(map(shown, found.verdict))))
     size = target.stat().st_size / 1e6

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.cli import main
-from host.errors import IdentificationError
+from host.errors import IdentificationError, UsageError
 from host.export.atomic_files import atomic_write
 from host.export.mat_writer import mat_name
 from host.sysid.answer import OutputPaths, check_outputs
@@ -139,7 +139,7 @@ def test_a_file_in_a_folder_that_takes_none_is_refused_before_the_work(
     path = tmp_path / "model.toml"
     path.write_text("before")
     monkeypatch.setattr(os, "access", lambda place, _: Path(place) != tmp_path)
-    with pytest.raises(IdentificationError, match=f"no permission to write to {tmp_path}$"):
+    with pytest.raises(UsageError, match=f"no permission to write to {tmp_path}$"):
         check_outputs(OutputPaths(save_model=path))
 
 
@@ -238,7 +238,7 @@ def test_a_device_is_written_to_as_it_is(answers: list[Answer]) -> None:
     with atomic_write(Path(os.devnull)) as part:
         assert part == Path(os.devnull)
     with (
-        pytest.raises(IdentificationError, match="No space left"),
+        pytest.raises(UsageError, match="No space left"),
         atomic_write(Path("/dev/full")) as part,
     ):
         part.write_text("x")

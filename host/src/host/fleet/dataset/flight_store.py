@@ -19,7 +19,7 @@ from urllib.parse import quote, unquote
 import pyarrow as pa
 from pyarrow import parquet
 
-from host.export.unfinished import unfinished
+from host.export.atomic_files import unfinished
 from host.fleet.dataset.flight_columns import PARTITIONS, SCHEMA
 from host.fleet.fleet_error import FleetError
 

@@ -353,7 +353,7 @@ def save(figure: Figure, path: Path) -> Path:
 
     Raises
     ------
-    IdentificationError
+    UsageError
         If it cannot be written.
     """
     with atomic_write(path) as part:

@@ -145,7 +145,7 @@ def write_outputs(
 
     Raises
     ------
-    IdentificationError
+    UsageError
         If a file cannot be written, or holds nothing that is known.
     """
     written: list[Path] = []

@@ -52,7 +52,7 @@ def write_history(path: Path, answer: Answer) -> None:
 
     Raises
     ------
-    IdentificationError
+    UsageError
         If the file cannot be written.
     """
     details = answer.result.details

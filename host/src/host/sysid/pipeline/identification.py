@@ -252,7 +252,7 @@ class Identification:
 
         Raises
         ------
-        IdentificationError
+        UsageError
             If a place cannot be written to, or holds what the answer is made from.
         """
         check_outputs(places)

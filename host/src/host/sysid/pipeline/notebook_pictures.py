@@ -42,7 +42,7 @@ class Pictures(Mapping[str, "Figure"]):
 
         Raises
         ------
-        IdentificationError
+        UsageError
             If one cannot be written.
         """
         return save_all(self._figures, Path(folder))
