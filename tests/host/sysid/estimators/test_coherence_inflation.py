@@ -38,7 +38,8 @@ def test_the_parameters_of_the_gust_are_left_out() -> None:
     """Four times the power widens derivatives twice; what gusts do keeps its interval."""
     result = _fitted("innovation")
     model = result.model
-    wide = inflate_by_coherence(result, _coherent(len(model.parameters), 1.0, 4.0, 0.5))
+    found = _coherent(len(model.parameters), 1.0, 4.0, 0.5)
+    wide = inflate_by_coherence(result, result.uncertainty, found)
     factor = np.asarray(wide.details[COUNTED])
     gust = np.array([name.startswith(PREFIX) for name in model.parameter_names])
     assert gust.any()
@@ -56,6 +57,6 @@ def test_the_bias_of_a_free_simulation_counts_in_its_own_deviations(
     """One that knows ten times less is biased by as much more: N_r was widened 38 times for 1 %."""
     result = _fitted(kind)
     found = _coherent(len(result.model.parameters), 100.0, 4.0, 1.0)
-    wide = inflate_by_coherence(result, found)
+    wide = inflate_by_coherence(result, result.uncertainty, found)
     k = result.index("M_alpha")
     assert wide.covariance[k, k] == pytest.approx(expected)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from host.sysid.estimators.filter_error_gust import fit_with_gust, without_gust_parameters
+from host.sysid.estimators.filter_error_gust import fit_with_gust, gust_parameters
 from host.sysid.estimators.gust_model import gust_model
 from host.sysid.estimators.gust_penetration import (
     GUST_LAG,
@@ -12,6 +12,7 @@ from host.sysid.estimators.gust_penetration import (
     without_gust_penetration,
 )
 from host.sysid.models import LinearModel, Maneuver, Trim, template
+from host.sysid.models.fit_result import without_parameters
 from scipy import linalg
 
 SPEED_MPS, SPAN_M, DT_S = 18.0, 1.8, 0.02
@@ -99,10 +100,11 @@ def test_parameters_of_turning_air_come_and_go() -> None:
 def test_an_answer_has_no_parameter_of_the_air() -> None:
     model = _model()
     found = fit_with_gust(model, [_flown(5, turning=True)], SPEED_MPS).result
-    alone = without_gust_parameters(found, without_gust_penetration(found.model))
+    bare = without_gust_penetration(found.model)
+    alone = without_parameters(found, bare, gust_parameters(found))
     assert alone.model.parameters == model.parameters
     assert not [name for name in alone.names if name.startswith(PREFIX)]
     for name in alone.names:
         assert alone.value(name) == found.value(name)
         assert alone.half_width()[alone.index(name)] == found.half_width()[found.index(name)]
-    assert without_gust_parameters(alone, model) is alone
+    assert not gust_parameters(alone)

@@ -82,8 +82,9 @@ def test_roll_derivatives_are_right_in_air_that_rolls() -> None:
         found = fit_with_gust(_model(), [_flown(seed)], SPEED_MPS).result
         assert found.method == "filter error with gust"
         half = found.half_width()
-        wider = with_unknown_roll_lag(found)
-        np.testing.assert_array_equal(wider.estimate, found.estimate)
+        wider = found.with_uncertainty(
+            with_unknown_roll_lag(found.names, found.estimate, found.uncertainty)
+        )
         by = dict(zip(found.names, wider.half_width() / half, strict=True))
         assert 1.05 < by["L_p"] < 2.0  # its pole and that of the gust's lag are told together
         assert by["N_dr"] < 1.02

@@ -246,7 +246,7 @@ def test_one_step_foretells_the_fit_of_disturbed_data() -> None:
             step / result.estimate[:6], expected / result.estimate[:6], atol=0.1 * largest
         )
     assert moved["pitot_scale"].qbar_gain == pytest.approx(1.0 - 0.02 * pressure_share(found), 1e-3)
-    wide = add_systematic_covariance(result, tuple(moved.values()))
+    wide = result.with_uncertainty(add_systematic_covariance(result, tuple(moved.values())))
     k = result.index("M_alpha")
     expected_half = np.hypot(
         result.half_width()[k],

@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 from host.sysid import FitResult, Maneuver, fit
-from host.sysid.numerics.maneuver_agreement import inflate_covariance, maneuver_agreement
+from host.sysid.numerics.maneuver_agreement import (
+    ManeuverAgreement,
+    inflate_covariance,
+    maneuver_agreement,
+)
 from host.sysid.numerics.output_error_problem import OutputProblem
 from studies.aircraft import navion_structured
 from studies.data import TRUTH, noisy
@@ -30,8 +34,12 @@ def flown(seed: int, spread: float, count: int = 5, method: str = "output-error"
     return fit(method, MODEL.with_start(TRUTH), maneuvers)
 
 
+def agreement(result: FitResult) -> ManeuverAgreement | None:
+    return maneuver_agreement(result.model.parameter_names, result.uncertainty)
+
+
 def test_maneuvers_of_one_aircraft_agree_as_often_as_chi_square_says() -> None:
-    found = [maneuver_agreement(flown(seed, 0.0)) for seed in range(20)]
+    found = [agreement(flown(seed, 0.0)) for seed in range(20)]
     p = np.array([f.p_value for f in found if f is not None])
     assert p.shape == (20, len(TRUTH))
     # 180 values, nine of a flight correlated: three deviations of a share of 0.1 and of 0.5.
@@ -43,9 +51,9 @@ def test_maneuvers_of_one_aircraft_agree_as_often_as_chi_square_says() -> None:
 @pytest.mark.parametrize("method", ["output-error", "output-error-white", "filter-error"])
 def test_an_aircraft_that_changes_is_named_and_its_interval_widened(method: str) -> None:
     result = flown(0, 0.1, method=method)
-    found = maneuver_agreement(result)
+    found = agreement(result)
     assert found is not None
-    wide = inflate_covariance(result, found)
+    wide = result.with_uncertainty(inflate_covariance(result.uncertainty, found))
     assert found.p_value[PLACE] < 1e-3
     assert found.factor[PLACE] > 2.0
     assert wide.standard_error[PLACE] == pytest.approx(
@@ -63,14 +71,14 @@ def test_widened_intervals_hold_the_mean_where_plain_ones_do_not() -> None:
         result = flown(seed, 0.1, count=6)
         off = abs(result.value("M_alpha") - TRUTH[PLACE])
         plain.append(off < result.half_width()[PLACE])
-        wide.append(
-            off < inflate_covariance(result, maneuver_agreement(result)).half_width()[PLACE]
-        )
+        known = inflate_covariance(result.uncertainty, agreement(result))
+        wide.append(off < result.with_uncertainty(known).half_width()[PLACE])
     assert np.mean(plain) < 0.75
     assert np.mean(wide) > 0.85
 
 
 def test_one_maneuver_says_nothing_of_scatter() -> None:
     result = fit("output-error", MODEL.with_start(TRUTH), [noisy(1, 0.05)])
-    assert maneuver_agreement(result) is None
-    assert inflate_covariance(result, None) is result
+    assert agreement(result) is None
+    known = result.uncertainty
+    assert inflate_covariance(known, None) is known

@@ -95,7 +95,7 @@ def test_rows_that_a_slow_sensor_did_not_measure_count_on_neither_side() -> None
     seen = np.asarray(maneuver.sampled)
     found = fit("filter-error", model, [maneuver], process=("p_radps",), compare_noise=False)
     rng = np.random.default_rng(12)
-    errors = random_errors(rng, found.model, found, ["p_radps"], maneuver, 1)[0]
+    errors = random_errors(rng, found.model, found.estimate, found, maneuver, 1)[0]
     assert not errors[~seen[:, 0]].any()
     left = (maneuver.outputs - free)[seen]
     assert np.mean(errors[seen[:, 0]] ** 2) == pytest.approx(np.mean(left**2), rel=0.3)
@@ -105,7 +105,7 @@ def test_rows_that_a_slow_sensor_did_not_measure_count_on_neither_side() -> None
     y = maneuver.outputs.copy()
     y[~seen] += 10.0  # whatever stands there is not looked at
     for data in (maneuver, replace(maneuver, outputs=y)):
-        [said] = predictions(found.model, found, noise, [data], [free]).values()
+        [said] = predictions(found.model, found, found.uncertainty, noise, [data], [free]).values()
         assert said.by_gusts
         assert said.holds
         assert said.nrmse == pytest.approx(np.std(left) / np.std(maneuver.outputs[seen]), rel=0.05)

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from host.arrays import Array
 from host.sysid.errors.one_step import one_step_of
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
@@ -24,25 +25,25 @@ from host.sysid.numerics.white_noise import white_deviation
 DRAWS, DRAW_SEED = 40, 3
 
 
-def with_column_noise(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim) -> FitResult:
-    """Return a result of output error with the noise of measured columns in its covariance.
+def column_noise(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim) -> Array:
+    """Return what the noise of measured columns adds to the covariance of output error, (P, P).
 
     Parameters
     ----------
     result : FitResult
-        Of other methods, and of models without columns, it comes back as it is.
+        Of other methods, and of models without columns, nothing is added.
     maneuvers : sequence of Maneuver
         That were fitted.
     trim : Trim
     """
-    model = result.model
+    model, none = result.model, np.zeros_like(result.covariance)
     if not isinstance(model, NonlinearModel) or result.residual_kind != "output":
-        return result
+        return none
     deviation = white_deviation([m.inputs for m in maneuvers])
     deviation[: model.source.controls] = 0.0  # surfaces: `sampling_error`
     found = one_step_of(result, maneuvers, trim) if np.any(deviation) else None
     if found is None:
-        return result
+        return none
     rng = np.random.default_rng(DRAW_SEED)
     moved = np.zeros((DRAWS, len(result.estimate)))
     for row in moved:
@@ -51,6 +52,4 @@ def with_column_noise(result: FitResult, maneuvers: Sequence[Maneuver], trim: Tr
             for m in maneuvers
         ]
         row[:] = found.change(model, trim, drawn).sum(axis=0)
-    return replace(
-        result, covariance=result.covariance + consider_covariance(moved / np.sqrt(DRAWS))
-    )
+    return consider_covariance(moved / np.sqrt(DRAWS))

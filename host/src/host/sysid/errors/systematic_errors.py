@@ -24,6 +24,7 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.rate_forces import by_prior, with_rate_forces
 from host.sysid.models.state_space_model import LinearModel, without_outputs
 from host.sysid.models.templates import TEMPLATES, Trim, template
+from host.sysid.models.uncertainty import Uncertainty
 from host.sysid.numerics.nonlinear_problem import output_problem
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.reconstruction.reconstruction import Compatibility
@@ -199,16 +200,16 @@ def _without_one(
     return perturb_columns(columns, error, deviation, known)
 
 
-def add_systematic_covariance(result: FitResult, moved: Sequence[ShiftedEstimate]) -> FitResult:
-    """Return the result with the systematic errors added to its covariance."""
+def add_systematic_covariance(result: FitResult, moved: Sequence[ShiftedEstimate]) -> Uncertainty:
+    """Return what is not known of a result, systematic errors added."""
+    known = result.uncertainty
     if not moved:
-        return result
-    shifts = np.stack([m.estimate - result.estimate for m in moved])
-    covariance = result.covariance + consider_covariance(shifts)
+        return known
+    total = known.plus(consider_covariance(np.stack([m.estimate - result.estimate for m in moved])))
     # Welch-Satterthwaite: what is carried is no small sample of maneuvers.
-    own = np.diag(result.covariance) / np.maximum(np.diag(covariance), 1e-300)
-    freedom = result.degrees_of_freedom / np.maximum(own, 1e-6) ** 2
-    return replace(result, covariance=covariance, degrees_of_freedom=freedom)
+    own = known.variance / np.maximum(total.variance, 1e-300)
+    freedom = known.degrees_of_freedom / np.maximum(own, 1e-6) ** 2
+    return replace(total, degrees_of_freedom=freedom)
 
 
 def _mean_of(cuts: Sequence[Mapping[str, Array]]) -> tuple[Trim, Condition]:

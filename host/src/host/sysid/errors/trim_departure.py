@@ -108,16 +108,16 @@ class Departure:
         """By how much the estimate moves, (P,)."""
         return np.asarray(self.shares.sum(axis=0))
 
-    def corrected(self, result: FitResult) -> FitResult:
-        """Return the result at the estimate moved, what each maneuver says of it with it.
+    def influence(self, details: Mapping[str, float | Array]) -> dict[str, Array]:
+        """Return the influence of each maneuver on the estimate moved, of that in the details.
 
         Maneuvers whose airspeed went different ways disagree before the step, not behind it.
         """
-        details = dict(result.details)
-        if isinstance(influence := details.get("maneuver_influence"), np.ndarray):
-            tested = np.any(influence != 0.0, axis=0)  # what need not agree stays out of the test
-            details["maneuver_influence"] = influence + tested * self.shares
-        return replace(result, estimate=result.estimate + self.step, details=details)
+        influence = details.get("maneuver_influence")
+        if not isinstance(influence, np.ndarray):
+            return {}
+        tested = np.any(influence != 0.0, axis=0)  # what need not agree stays out of the test
+        return {"maneuver_influence": influence + tested * self.shares}
 
     @property
     def thrust(self) -> ThrustColumn | None:
@@ -158,10 +158,6 @@ class Departure:
             airspeed_noise=np.zeros((length, length)),
             model=_with_second_order(self.varying.model, self.varying.base, known),
         )
-
-    def with_airspeed_noise(self, result: FitResult) -> FitResult:
-        """Return the result with the noise of the airspeed in its covariance."""
-        return replace(result, covariance=result.covariance + self.airspeed_noise)
 
     def removed_from(self, maneuvers: Sequence[Maneuver], estimate: Array) -> list[Maneuver]:
         """Return the maneuvers as if nothing had departed; as they are if the model diverges.

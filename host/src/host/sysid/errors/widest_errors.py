@@ -10,13 +10,14 @@ from host.instrument.error_labels import ERROR_LABELS
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
 from host.sysid.models.consider_covariance import dominant_error_source
 from host.sysid.models.fit_result import FitResult
+from host.sysid.models.uncertainty import Uncertainty
 
 NOISE = "noise and gusts"
 BESIDE = "maneuvers that differ, motion beside the model"
 
 
 def widest_errors(
-    fit: FitResult, statistical: FitResult, total: FitResult, shifts: Sequence[ShiftedEstimate]
+    fit: FitResult, statistical: FitResult, total: Uncertainty, shifts: Sequence[ShiftedEstimate]
 ) -> dict[str, str]:
     """Return the largest cause of the variance of each parameter; none where nothing causes a
     quarter of it.
@@ -27,7 +28,7 @@ def widest_errors(
         As estimated: noise alone.
     statistical : FitResult
         With scatter of the maneuvers and what inputs drive beside the model.
-    total : FitResult
+    total : Uncertainty
         With the systematic errors.
     shifts : sequence of ShiftedEstimate
         Of one deviation of each systematic error.
@@ -38,9 +39,9 @@ def widest_errors(
         label = ERROR_LABELS.get(shift.error, shift.error)
         moved = (shift.estimate - statistical.estimate) ** 2
         parts[label] = parts.get(label, np.zeros(len(noise))) + moved
-    variance = np.diag(total.covariance)
+    variance = total.variance
     causes = {
         name: dominant_error_source({c: float(p[k]) for c, p in parts.items()}, float(variance[k]))
-        for k, name in enumerate(total.names)
+        for k, name in enumerate(statistical.names)
     }
     return {name: cause for name, cause in causes.items() if cause}

@@ -14,6 +14,7 @@ from host.arrays import Array
 from host.sysid.estimators.gust_penetration import PREFIX
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
+from host.sysid.models.uncertainty import Uncertainty
 from host.sysid.numerics.input_coherence import InputCoherence
 
 REPORTED_FACTOR = 1.05  # times wider
@@ -38,10 +39,11 @@ class NoiseExcess:
 
 def inflate_by_coherence(
     result: FitResult,
+    known: Uncertainty,
     found: InputCoherence | None,
     excess: NoiseExcess | None = None,
-) -> FitResult:
-    """Return the result with intervals that hold what the inputs drive beside the model.
+) -> Uncertainty:
+    """Return a covariance that holds what the inputs drive beside the model.
 
     They are widened where that is suspected at 10 %, and it is said at 1 %. The bias by the error
     that the residual looks most like is a consider covariance: of output error as it is, of other
@@ -56,15 +58,17 @@ def inflate_by_coherence(
     Parameters
     ----------
     result : FitResult
+    known : Uncertainty
+        What was not known of it without.
     found : InputCoherence or None
         Of its free simulation. Nothing changes without, or if no output is coherent.
     excess : NoiseExcess, optional
         Outputs whose residual is larger than the fit's own noise and gust model predicts.
     """
-    if found is None or not (found.suspected or excess) or COUNTED in result.details:
-        return result
+    if found is None or not (found.suspected or excess) or COUNTED in known.details:
+        return known
     count = len(result.model.parameter_names)
-    own = np.diag(result.covariance)[:count]
+    own = known.variance[:count]
     wide = np.diag(found.widened_covariance())[:count]
     moved = found.shift[:count]
     if result.residual_kind == "output":
@@ -75,45 +79,26 @@ def inflate_by_coherence(
         moved = moved * np.sqrt(own / simulated)
         if excess is not None:
             ratio = np.maximum(ratio, excess.variance_ratio[:count])
-    factor = np.ones(len(result.covariance))
     # What gusts do is no derivative: the model of the gust is not what the inputs drive.
     own = np.where([n.startswith(PREFIX) for n in result.names[:count]], 0.0, own)
-    factor[:count] = np.where(own > 0.0, np.sqrt(np.maximum(ratio, 1.0)), 1.0)
-    covariance = result.covariance * np.outer(factor, factor)
+    larger = known.times(np.where(own > 0.0, np.sqrt(np.maximum(ratio, 1.0)), 1.0))
     shift = np.where(own > 0.0, moved, 0.0)
-    covariance[:count, :count] += consider_covariance(shift[None])
-    factor[:count] = np.sqrt(np.diag(covariance)[:count] / np.where(own > 0.0, own, 1.0))
+    wider = larger.plus(consider_covariance(shift[None]))
+    factor = np.ones(len(wider.covariance))
+    factor[:count] = np.sqrt(wider.variance[:count] / np.where(own > 0.0, own, 1.0))
     factor[:count] = np.where(own > 0.0, factor[:count], 1.0)
-    freedom = result.degrees_of_freedom.copy()
     pairs = zip(found.outputs, found.columns, strict=True)
     columns = [float(c) for n, c in pairs if n in found.suspected]
-    widened = np.flatnonzero(factor > 1.0)
-    freedom[widened] = np.minimum(freedom[widened], max(min(columns, default=np.inf), 1.0))
-    return replace(
-        result,
-        covariance=covariance,
-        degrees_of_freedom=freedom,
-        warnings=(*result.warnings, *_lines(result, found, factor, excess)),
-        details={**result.details, COUNTED: factor},
-    )
+    widened, freedom = np.flatnonzero(factor > 1.0), min(columns, default=np.inf)
+    wider = wider.of_a_sample(widened, freedom, *_lines(result, found, factor, excess))
+    return replace(wider, details={**wider.details, COUNTED: factor})
 
 
-def widened_to(result: FitResult, variance: Array) -> FitResult:
-    """Return the result with no parameter of its model known better than these variances say.
-
-    Parameters
-    ----------
-    result : FitResult
-    variance : Array, shape (>= P,)
-        Of the model's parameters first.
-    """
-    count = len(result.model.parameter_names)
-    own = np.diag(result.covariance)[:count]
-    factor = np.ones(len(result.covariance))
-    factor[:count] = np.sqrt(
-        np.maximum(np.where(own > 0.0, variance[:count] / np.maximum(own, 1e-300), 1.0), 1.0)
-    )
-    return replace(result, covariance=result.covariance * np.outer(factor, factor))
+def widened_to(known: Uncertainty, variance: Array) -> Uncertainty:
+    """Return a covariance that knows no first parameter better than its variance here, (k,)."""
+    own = known.variance[: len(variance)]
+    ratio = np.where(own > 0.0, variance / np.maximum(own, 1e-300), 1.0)
+    return known.times(np.sqrt(np.maximum(ratio, 1.0)))
 
 
 def _lines(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.noise_model_comparison import DECISIVE, bayes_criterion
 from host.sysid.estimators.output_error_fit import NO_CONVERGENCE
 from host.sysid.estimators.start_values import start_values_of
-from host.sysid.models.fit_result import FitResult, without_parameters
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.rate_forces import by_prior
 from host.sysid.models.state_space_model import LinearModel
@@ -54,7 +54,7 @@ def fit_with_gust(
     model: LinearModel,
     maneuvers: Sequence[Maneuver],
     airspeed_mps: float,
-    before: FitResult | None = None,
+    before: Mapping[str, float] | None = None,
     *,
     roughly: bool = False,
 ) -> GustFit:
@@ -68,15 +68,15 @@ def fit_with_gust(
         Data as measured.
     airspeed_mps : float
         Of the trim, for the gust's time scale, m/s.
-    before : FitResult, optional
-        Of this kind, without delays, to start from; by default output error.
+    before : mapping of str to float, optional
+        Estimates of such a fit without delays, to start from; by default those of output error.
     roughly : bool
         End the search early, to start another from.
     """
     bare = replace(model, delays=())
     start = None
     if before is not None:
-        start = np.array([before.value(n) for n in OutputProblem(bare, maneuvers).names])
+        start = np.array([before[n] for n in OutputProblem(bare, maneuvers).names])
     if not model.delays:
         start = start_values_of(model, maneuvers) if start is None else start
         result = fit_gust_state(model, list(maneuvers), airspeed_mps, start, before, roughly)
@@ -122,9 +122,9 @@ def _moves(moving: FitResult, bare: LinearModel, shifted: Sequence[Maneuver]) ->
     return bayes_criterion(still, shifted) - bayes_criterion(moving, shifted) > DECISIVE
 
 
-def without_gust_parameters(result: FitResult, model: LinearModel) -> FitResult:
-    """Return the result on the model of the aircraft alone: what gusts do is no derivative."""
-    return without_parameters(result, model, [n for n in result.names if n.startswith(PREFIX)])
+def gust_parameters(result: FitResult) -> list[str]:
+    """Return the names of what gusts do, which is no derivative."""
+    return [name for name in result.names if name.startswith(PREFIX)]
 
 
 def _with_initial_gusts(
@@ -148,7 +148,7 @@ def fit_gust_state(
     maneuvers: Sequence[Maneuver],
     airspeed_mps: float,
     start: Array,
-    before: FitResult | None = None,
+    before: Mapping[str, float] | None = None,
     roughly: bool = False,
 ) -> FitResult:
     """Return filter error with the gust as a state; output error if that does not converge.
@@ -161,11 +161,10 @@ def fit_gust_state(
     first = _with_initial_gusts(first, plain, augmented, len(maneuvers))
     noise = None
     if before is not None:
-        names = [n for n in before.names if n.startswith("log_")]
-        noise = np.array([before.value(n) for n in names])
+        noise = np.array([value for name, value in before.items() if name.startswith("log_")])
         for k, parameter in enumerate(plain.parameters):
             if parameter.name.startswith(PREFIX):
-                first[k] = before.value(parameter.name)
+                first[k] = before[parameter.name]
     try:
         result = fit_filter_error(
             augmented,
@@ -178,8 +177,6 @@ def fit_gust_state(
             restricted=not roughly,
         )
         failure = "" if near_its_optimum(result) else result.warnings[0]
-        if not failure:
-            result = replace(result, converged=True, warnings=())
     except IdentificationError as error:
         failure = str(error)
     if not failure:
@@ -194,6 +191,8 @@ def fit_gust_state(
             details=details,
             method="filter error with gust",
             model=plain,
+            converged=True,
+            warnings=(),
             covariance=result.covariance
             if innovations is None
             else innovations.coloured_covariance(),

@@ -16,8 +16,8 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.models.consider_covariance import consider_covariance
-from host.sysid.models.fit_result import FitResult
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
+from host.sysid.models.uncertainty import Uncertainty
 
 PREFIX = "gust_"
 GUST_LAG = "gust_lag_radps"
@@ -96,20 +96,22 @@ def _lag(name: str, lag: float) -> Parameter:
     )
 
 
-def with_unknown_roll_lag(result: FitResult) -> FitResult:
-    """Return the result with intervals that count another lag of the gust that rolls.
+def with_unknown_roll_lag(
+    names: tuple[str, ...], estimate: Array, known: Uncertainty
+) -> Uncertainty:
+    """Return a covariance that counts another lag of the gust that rolls.
 
     Its lag stands for that of the aircraft's own roll: where both are read from the same noise one
     may be quicker and the other slower.
     """
-    if ROLL_LAG not in result.names:
-        return result
-    k = result.index(ROLL_LAG)
-    if result.covariance[k, k] <= 0.0:
-        return result
-    by = result.covariance[:, k] / result.covariance[k, k]
-    shift = ROLL_FORM_SHARE * result.value(ROLL_LAG) * by
-    return replace(result, covariance=result.covariance + consider_covariance(shift[None]))
+    if ROLL_LAG not in names:
+        return known
+    k = names.index(ROLL_LAG)
+    if known.variance[k] <= 0.0:
+        return known
+    by = known.covariance[:, k] / known.variance[k]
+    shift = ROLL_FORM_SHARE * estimate[k] * by
+    return known.plus(consider_covariance(shift[None]))
 
 
 def without_gust_penetration(model: LinearModel) -> LinearModel:

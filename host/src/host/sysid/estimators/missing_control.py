@@ -21,6 +21,7 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
+from host.sysid.models.uncertainty import Uncertainty
 from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.information_inverse import identified_inverse
 
@@ -112,16 +113,14 @@ def missing_control(
     return MissingControl(tuple(said), (moved @ effect)[:first])
 
 
-def widened_by_missing_control(result: FitResult, found: MissingControl | None) -> FitResult:
-    """Return the result with intervals that hold what the absent effects moved, and a line."""
+def widened_by_missing_control(known: Uncertainty, found: MissingControl | None) -> Uncertainty:
+    """Return a covariance that holds what the absent effects moved, and a line."""
     if found is None:
-        return result
-    covariance, count = result.covariance.copy(), len(found.shift)
-    own = np.diag(covariance)[:count] > 0.0
-    covariance[:count, :count] += consider_covariance((found.shift * own)[None])
+        return known
+    own = known.variance[: len(found.shift)] > 0.0
     where = ", ".join(found.where) or "the outputs"
     line = f"the inputs act where the model has no effect of theirs ({where}): intervals widened"
-    return replace(result, covariance=covariance, warnings=(*result.warnings, line))
+    return known.plus(consider_covariance((found.shift * own)[None]), line)
 
 
 def _absent_entries(model: LinearModel) -> list[tuple[str, int, int]]:

@@ -109,7 +109,10 @@ def fit_output_error(
             **_maneuver_influence(problem, fit),
         },
     )
-    return inflate_by_coherence(result, coherence)
+    if coherence is None:
+        return result
+    known = inflate_by_coherence(result, result.uncertainty, coherence)
+    return result.with_uncertainty(known)
 
 
 def sample_periods(maneuvers: Sequence[Maneuver]) -> list[float]:

@@ -186,7 +186,7 @@ def _gust_fit(
         )
     bare = replace(model, delays=())
     before = fit_with_gust(bare, maneuvers, airspeed_mps, roughly=True).result
-    known = before if before.residual_kind == "innovation" else None
+    known = before.values if before.residual_kind == "innovation" else None
     found = fit_with_gust(model, maneuvers, airspeed_mps, known)
     if found.result.residual_kind != "innovation":
         calm = SLOW_IN_CALM in found.result.warnings

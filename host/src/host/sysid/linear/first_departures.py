@@ -47,7 +47,7 @@ def first_departures(
         rough = fit("output-error-white", model, data, multiple_starts=False)
         departure = departure_of(rough, data, [m.departing() for m in used])
         if departure is not None:
-            still = departure.removed_from(data, departure.corrected(rough).estimate)
+            still = departure.removed_from(data, rough.estimate + departure.step)
     return [m.outputs - s.outputs for m, s in zip(data, still, strict=True)]
 
 

@@ -25,7 +25,7 @@ def fit_gust_at_trim(
     trim: Trim,
     airframe: AirframeData | None,
     spin: tuple[float, float],
-) -> tuple[GustFit, list[Maneuver], list[Maneuver]]:
+) -> tuple[GustFit, list[Maneuver], tuple[Array, ...]]:
     """Fit with the gust as a state, departures from the trim removed at a first such fit.
 
     One step behind the fit does not do: in calm air the IMU seemed 0.3 ms late by what the
@@ -47,8 +47,8 @@ def fit_gust_at_trim(
 
     Returns
     -------
-    GustFit, list of Maneuver, list of Maneuver
-        The fit, and the maneuvers without delays: as measured, and as fitted.
+    GustFit, list of Maneuver, tuple of Array
+        The fit, its maneuvers without delays as measured, and what it says of their outputs.
     """
     bare = replace(model, delays=())
     thrust = thrust_terms(bare, cuts, trim, airframe)
@@ -62,16 +62,16 @@ def fit_gust_at_trim(
     at_trim, before = even or list(data), None
     if rough.residual_kind == "innovation":
         departure = correct_trim_departure(rough, data, cuts, airframe, trim, spin, even)
-        before = rough if departure is None else departure.corrected(rough)
+        estimate = rough.estimate
         if departure is not None:
-            at_trim = departure.removed_from(data, before.estimate)
+            estimate = estimate + departure.step
+            at_trim = departure.removed_from(data, estimate)
+        before = dict(zip(rough.names, estimate.tolist(), strict=True))
     staged = fit_with_gust(model, at_trim, trim.airspeed_mps, before)
     delays_s = {name: value for name, (value, _) in staged.delays.items()}
     measured = [advance_outputs(m, model, delays_s) for m in data]
-    # What the fit says of the data as measured, departures with it.
     fitted = tuple(
         y + m.outputs - still.outputs
         for y, m, still in zip(staged.result.fitted, measured, staged.maneuvers, strict=True)
     )
-    staged = replace(staged, result=replace(staged.result, fitted=fitted))
-    return staged, measured, list(staged.maneuvers)
+    return staged, measured, fitted

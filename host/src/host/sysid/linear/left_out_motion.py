@@ -151,7 +151,7 @@ def _in_gusts(
             return None
         # What gusts do to output error is not to say how large the terms may be.
         found = found.expecting(first)
-        moving = fit_with_gust(found.wide_model(model), found.maneuvers, airspeed_mps, first)
+        moving = fit_with_gust(found.wide_model(model), found.maneuvers, airspeed_mps, first.values)
     except IdentificationError:
         return None
     if moving.result.residual_kind != "innovation":

@@ -17,7 +17,7 @@ from host.sysid.aerodynamics.coefficient_table import (
     coefficients,
     trim_of,
 )
-from host.sysid.aerodynamics.thrust_terms import THRUST_BESIDE, with_thrust
+from host.sysid.aerodynamics.thrust_terms import with_thrust
 from host.sysid.errors.surface_motion import (
     HELD,
     HELD_SURFACES,
@@ -33,7 +33,7 @@ from host.sysid.errors.trim_departure import (
     spin_of,
 )
 from host.sysid.errors.widest_errors import widest_errors
-from host.sysid.estimators.filter_error_gust import without_gust_parameters
+from host.sysid.estimators.filter_error_gust import gust_parameters
 from host.sysid.estimators.gust_model import VANES
 from host.sysid.estimators.gust_penetration import without_gust_penetration
 from host.sysid.estimators.method_registry import fit, refuse_unless_finite
@@ -68,7 +68,7 @@ from host.sysid.models.diagnostics import (
     collinearity,
     constant_inputs,
 )
-from host.sysid.models.fit_result import FitResult
+from host.sysid.models.fit_result import FitResult, without_parameters
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.modal_analysis import modes
 from host.sysid.models.state_space_model import LinearModel
@@ -147,7 +147,7 @@ class LinearEstimator:
         cuts, departing = [m.inside() for m in used], [m.departing() for m in used]
         spin = spin_of(self.powerplant, departing) if self.own is None else NO_SPIN
         delays: dict[str, tuple[float, float]] = {}
-        fitted = beside = None
+        fitted = beside = said = None
         single = "output-error-white" if method == GUST and not gusty else method
         single_start: dict[str, object] = (
             {"multiple_starts": False} if single.startswith("output-error") else {}
@@ -162,8 +162,9 @@ class LinearEstimator:
             found, model, method = beside.result, beside.model, GUST if beside.in_gusts else method
             data, delays = list(beside.maneuvers), beside.delays
         elif gusty:
-            staged, data, fitted = fit_gust_at_trim(model, data, cuts, trim, self.airframe, spin)
+            staged, data, said = fit_gust_at_trim(model, data, cuts, trim, self.airframe, spin)
             found, model, delays = staged.result, staged.model, staged.delays
+            fitted = list(staged.maneuvers)
         elif own is not None:
             speed = trim.airspeed_mps if trim.known else None
             by = (
@@ -178,18 +179,15 @@ class LinearEstimator:
             found = fit(single, model, fitted, **options)
             both = list(zip(found.fitted, departures, strict=True))
             if all(y.shape == gone.shape for y, gone in both):  # of frequencies they are others
-                found = replace(found, fitted=tuple(y + gone for y, gone in both))
+                said = tuple(y + gone for y, gone in both)
         # The start of a gust filter that was lost may have run away: M_alpha -57 000 of one point.
         refuse_unless_finite(found, found.method)
         found = found if servo is None else servo.added_to(found)
-        found = replace(found, warnings=(*remarks, *found.warnings))
         left = None
         if beside is not None:
             left = beside.departure
         elif trim.known and self.own is None and found.residual_kind in FREE:
             left = correct_trim_departure(found, data, departing, self.airframe, trim, spin, fitted)
-        if left is not None and left.varying.thrust:
-            found = replace(found, warnings=(*found.warnings, THRUST_BESIDE))
         return LinearEstimate(
             template=self.template if self.own is None else model.name,
             method=method,
@@ -203,8 +201,10 @@ class LinearEstimator:
             fit=found,
             departure=left,
             delays=delays,
+            fitted=found.fitted if said is None else said,
             servo=servo,
             left_out=() if self.own else unaccounted_motion(model, left, beside),
+            remarks=remarks,
         )
 
     def _first_departures(
@@ -239,10 +239,13 @@ class LinearEstimator:
     ) -> Answer:
         """Return the parts of all stages as one answer, judged."""
         e, model = estimate, estimate.model
-        total, statistical = intervals.total, intervals.statistical
+        statistical = intervals.statistical
+        gusts: list[str] = []  # what they do is no derivative
         if e.method == GUST:  # a user may name a parameter of his gust_..., and keeps it
             model = without_gust_penetration(model)
-            total, statistical = (without_gust_parameters(r, model) for r in (total, statistical))
+            gusts = gust_parameters(statistical)
+        result = without_parameters(statistical, model, gusts, intervals.total)
+        kept = np.array([name not in gusts for name in statistical.names])
         carrier = e.used[0].flight.compatibility
         return Answer(
             template=e.template,
@@ -254,12 +257,12 @@ class LinearEstimator:
             maneuvers=e.maneuvers,
             used=tuple(m.found for m in e.used),
             held_out=tuple(m.found for m in e.held_out),
-            result=total,
+            result=result,
             fits=validation.fits,
             validation=validation.held_out,
-            identifiability_flags=assess_identifiability(total, e.maneuvers).flags,
-            collinearity=collinearity(statistical),
-            modes=modes(total),
+            identifiability_flags=assess_identifiability(result, e.maneuvers).flags,
+            collinearity=collinearity(statistical, gusts),
+            modes=modes(result),
             coefficients=() if intervals.parts is None else coefficients(intervals.parts),
             coefficient_parts=intervals.parts,
             constant_inputs=constant_inputs(e.model, e.maneuvers),
@@ -272,7 +275,7 @@ class LinearEstimator:
             predictions=validation.predictions,
             explained=validation.explained,
             held_out_runs=validation.held_out_runs,
-            noise_covariance=statistical.covariance,
+            noise_covariance=statistical.covariance[np.ix_(kept, kept)],
             left_out=e.left_out,
             standard_delays=standard_delays(e.used),
             causes=widest_errors(e.fit, intervals.statistical, intervals.total, intervals.shifts),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from host.sysid.aerodynamics.coefficient_table import (
 )
 from host.sysid.aerodynamics.path_thrust import path_thrust
 from host.sysid.errors.airspeed_tolerance import airspeed_shift
-from host.sysid.errors.column_noise import with_column_noise
+from host.sysid.errors.column_noise import column_noise
 from host.sysid.errors.sampling_error import hold_shift
 from host.sysid.errors.surface_motion import kink_residuals, motion_shift, surfaces_known
 from host.sysid.errors.systematic_errors import (
@@ -34,6 +35,7 @@ from host.sysid.linear.linear_stages import LinearEstimate, LinearIntervals
 from host.sysid.maneuvers.pilot_takeover import taken_over
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.uncertainty import Uncertainty
 from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
 from host.sysid.numerics.maneuver_agreement import inflate_covariance, maneuver_agreement
 from host.sysid.numerics.score_variance import white_fit_variance
@@ -66,7 +68,7 @@ def linear_intervals(
         The model is one of the user's own.
     """
     e = estimate
-    statistical, coherence = _of_noise(e)
+    statistical, coherence = _statistical(e)
     shifts = _shifts(e, statistical, airframe, own=own)
     found: CoefficientParts | None = None
     if airframe is not None and e.trim.known:
@@ -79,40 +81,65 @@ def linear_intervals(
     )
 
 
-def _of_noise(e: LinearEstimate) -> tuple[FitResult, InputCoherence | None]:
-    """Return the result at the trim, noise, repeats and what inputs drive in its covariance."""
-    statistical = e.fit if e.departure is None else e.departure.corrected(e.fit)
-    # Airspeed that varied is known: what it does is no model error.
-    at_trim = e.at_trim(e.estimate)
+def _statistical(e: LinearEstimate) -> tuple[FitResult, InputCoherence | None]:
+    """Return the estimate at its trim, and what the inputs drive beside the model.
+
+    Noise, what the model lacks, and the noise of the airspeed are in its covariance.
+    """
+    at_trim = e.at_trim(e.estimate)  # airspeed that varied is known: what it does is no model error
     free = free_responses(e.model, e.estimate, at_trim)
-    coherence = excess = None
-    if free is not None:
-        coherence = _coherence(e, free, at_trim)
-        excess = excess_over_noise_model(free, statistical, e.trim.airspeed_mps)
-        # Before maneuvers are compared: by noise without memory a gust made them disagree.
-        if statistical.method == WHITE:
-            statistical = widened_to(
-                statistical,
-                white_fit_variance(
-                    free.problem,
-                    free.responses,
-                    coherence.noise,
-                    coherence.innovation_variance,
-                ),
-            )
-    statistical = with_column_noise(statistical, e.maneuvers, e.trim)
-    noisy = statistical if e.departure is None else e.departure.with_airspeed_noise(statistical)
-    statistical = inflate_covariance(statistical, maneuver_agreement(noisy))
-    statistical = inflate_by_coherence(statistical, coherence, excess)
-    absent = missing_control(e.fit, at_trim, e.trim.airspeed_mps)
-    statistical = widened_by_missing_control(statistical, absent)
-    # Behind what a model error multiplies: this noise is known.
-    if e.departure is not None:
-        statistical = e.departure.with_airspeed_noise(statistical)
+    coherence = None if free is None else _coherence(e, free, at_trim)
+    of_speed = np.zeros((0, 0)) if e.departure is None else e.departure.airspeed_noise
+    noise = _noise(e, free, coherence)
+    known = _with_model_error(e, noise, noise.plus(of_speed), free, coherence, at_trim)
+    known = known.plus(of_speed)  # this noise is known, no model error multiplies it
     # Our own log is fitted in means, which lean less on what the gust is between samples.
     if others_recorded(e.used):
-        statistical = with_unknown_roll_lag(statistical)
-    return statistical, coherence
+        known = with_unknown_roll_lag(e.fit.names, e.estimate, known)
+    result = replace(
+        e.fit,
+        estimate=e.estimate,
+        covariance=known.covariance,
+        degrees_of_freedom=known.degrees_of_freedom,
+        fitted=e.fitted,
+        warnings=(*e.warnings, *known.warnings),
+        details=dict(known.details),
+    )
+    return result, coherence
+
+
+def _noise(
+    e: LinearEstimate, free: FreeResponses | None, coherence: InputCoherence | None
+) -> Uncertainty:
+    """Return what noise leaves open: of the method, with a memory, and of columns that drive."""
+    known = replace(e.noise, warnings=())
+    # Before maneuvers are compared: by noise without memory a gust made them disagree.
+    if free is not None and coherence is not None and e.fit.method == WHITE:
+        memory, power = coherence.noise, coherence.innovation_variance
+        variance = white_fit_variance(free.problem, free.responses, memory, power)
+        known = widened_to(known, variance[: len(e.fit.model.parameter_names)])
+    return known.plus(column_noise(e.fit, e.maneuvers, e.trim))
+
+
+def _with_model_error(
+    e: LinearEstimate,
+    noise: Uncertainty,
+    scattering: Uncertainty,
+    free: FreeResponses | None,
+    coherence: InputCoherence | None,
+    at_trim: Sequence[Maneuver],
+) -> Uncertainty:
+    """Return noise, and what the model lacks: all that three tests say of it, none of another's.
+
+    `scattering` is the noise that makes maneuvers disagree.
+    """
+    airspeed_mps = e.trim.airspeed_mps
+    scatter = maneuver_agreement(e.fit.model.parameter_names, scattering)
+    excess = None if free is None else excess_over_noise_model(free, e.fit, airspeed_mps)
+    absent = missing_control(e.fit, at_trim, airspeed_mps)
+    known = inflate_covariance(noise, scatter)
+    known = inflate_by_coherence(e.fit, known, coherence, excess)
+    return widened_by_missing_control(known, absent)
 
 
 def _coherence(

@@ -28,15 +28,15 @@ def linear_validation(
     own : LinearModel or None
         The user's own, whose delays stand in it.
     """
-    e, total = estimate, intervals.total
+    e, result = estimate, intervals.statistical
     # Of frequencies the residuals are not those of samples.
-    ours = total.residual_kind == "output" and all(
-        y.shape == m.outputs.shape for y, m in zip(total.fitted, e.maneuvers, strict=True)
+    ours = result.residual_kind == "output" and all(
+        y.shape == m.outputs.shape for y, m in zip(result.fitted, e.maneuvers, strict=True)
     )
     same = ours and not intervals.shifts
-    frozen = frozen_model(e.model, total)
+    frozen = frozen_model(e.model, result)
     simulated = (
-        list(total.fitted) if same else _simulated(frozen, e.maneuvers, e.at_trim(total.estimate))
+        list(result.fitted) if same else _simulated(frozen, e.maneuvers, e.at_trim(result.estimate))
     )
     late = delays_of(e.model.outputs) if own is None else own.delays
     held_out = [_without_delays(m.cut(e.model), e.model, late, e.delays) for m in e.held_out]
@@ -44,7 +44,7 @@ def linear_validation(
         held_out
         if e.departure is None
         else e.departure.removed_from_held_out(
-            held_out, [m.departing() for m in e.held_out], total.estimate
+            held_out, [m.departing() for m in e.held_out], result.estimate
         )
     )
     held_out_runs = _simulated(frozen, held_out, at_trim)
@@ -53,14 +53,16 @@ def linear_validation(
     noise, airspeed_mps = intervals.coherence, e.trim.airspeed_mps
     explained: dict[str, Prediction] = {}
     # Drawing gusts took 8 % of the five-minute default: only where an output is missed by half.
-    if driven_states(total) and missed(fits):
-        explained = predictions(e.model, total, noise, e.maneuvers, simulated, airspeed_mps)
+    if driven_states(result) and missed(fits):
+        explained = predictions(
+            e.model, result, intervals.total, noise, e.maneuvers, simulated, airspeed_mps
+        )
     asked_mps = airspeed_mps if missed(held_out_fits) else None
     return LinearValidation(
         tuple(simulated),
         fits,
         held_out_fits,
-        predictions(e.model, total, noise, held_out, held_out_runs, asked_mps),
+        predictions(e.model, result, intervals.total, noise, held_out, held_out_runs, asked_mps),
         tuple(zip(held_out, held_out_runs, strict=True)),
         explained,
     )

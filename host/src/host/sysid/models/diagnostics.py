@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -371,12 +371,13 @@ class Collinearity:
         return self.condition > CONDITION_LIMIT
 
 
-def collinearity(result: FitResult) -> Collinearity:
-    """Return the collinearity of the estimates.
+def collinearity(result: FitResult, beside: Collection[str] = ()) -> Collinearity:
+    """Return the collinearity of the estimates, some parameters left out.
 
     Klein & Morelli, Aircraft System Identification, ch. 5.
     """
-    estimated = np.flatnonzero(result.standard_error > 0.0)
+    asked = np.array([name not in beside for name in result.names])
+    estimated = np.flatnonzero(asked & (result.standard_error > 0.0))
     correlation = result.correlation[np.ix_(estimated, estimated)]
     values = np.linalg.eigvalsh(correlation)
     condition = float(values[-1] / max(values[0], 1e-300))

@@ -10,6 +10,7 @@ import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.uncertainty import Uncertainty
 
 
 @dataclass(frozen=True)
@@ -79,9 +80,29 @@ class FitResult:
             )
         return self.names.index(name)
 
+    @property
+    def values(self) -> dict[str, float]:
+        """The estimate of each parameter by its name."""
+        return dict(zip(self.names, self.estimate.tolist(), strict=True))
+
     def value(self, name: str) -> float:
         """Return the estimate of one parameter."""
         return float(self.estimate[self.index(name)])
+
+    @property
+    def uncertainty(self) -> Uncertainty:
+        """What is not known of the estimate."""
+        return Uncertainty(self.covariance, self.degrees_of_freedom, self.warnings, self.details)
+
+    def with_uncertainty(self, known: Uncertainty) -> FitResult:
+        """Return the same estimate, known as well as that."""
+        return replace(
+            self,
+            covariance=known.covariance,
+            degrees_of_freedom=known.degrees_of_freedom,
+            warnings=known.warnings,
+            details=dict(known.details),
+        )
 
     @property
     def standard_error(self) -> Array:
@@ -108,7 +129,9 @@ class FitResult:
         return self.model.matrices(self.estimate[: len(self.model.parameters)])
 
 
-def without_parameters(result: FitResult, model: LinearModel, names: Collection[str]) -> FitResult:
+def without_parameters(
+    result: FitResult, model: LinearModel, names: Collection[str], known: Uncertainty | None = None
+) -> FitResult:
     """Return a result on a model that has not these parameters; the others stay as uncertain.
 
     Parameters
@@ -117,13 +140,16 @@ def without_parameters(result: FitResult, model: LinearModel, names: Collection[
     model : LinearModel
         Without them.
     names : collection of str
+    known : Uncertainty, optional
+        Of all parameters, in place of that of the result.
     """
     kept = [k for k, name in enumerate(result.names) if name not in names]
     if len(kept) == len(result.names):
-        return result
+        return result if known is None else result.with_uncertainty(known)
+    known = known or result.uncertainty
     by_maneuver = {
         key: value[:, kept]
-        for key, value in result.details.items()
+        for key, value in known.details.items()
         if key in ("maneuver_influence", "information_share") and isinstance(value, np.ndarray)
     }
     return replace(
@@ -131,8 +157,9 @@ def without_parameters(result: FitResult, model: LinearModel, names: Collection[
         model=model,
         names=tuple(result.names[k] for k in kept),
         estimate=result.estimate[kept],
-        covariance=result.covariance[np.ix_(kept, kept)],
+        covariance=known.covariance[np.ix_(kept, kept)],
         covariance_white=result.covariance_white[np.ix_(kept, kept)],
-        degrees_of_freedom=result.degrees_of_freedom[kept],
-        details={**result.details, **by_maneuver},
+        degrees_of_freedom=known.degrees_of_freedom[kept],
+        warnings=known.warnings,
+        details={**known.details, **by_maneuver},
     )

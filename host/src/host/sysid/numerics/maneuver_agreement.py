@@ -11,13 +11,13 @@ interval gets a t quantile for as many maneuvers. A covariance never becomes sma
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import special
 
 from host.arrays import Array
-from host.sysid.models.fit_result import FitResult
+from host.sysid.models.uncertainty import Uncertainty
 
 SIGNIFICANCE = 0.01
 MIN_EFFECTIVE_MANEUVERS = 1.5  # effective number that inform a parameter, for a test
@@ -76,22 +76,29 @@ def maneuver_influence(
     }
 
 
-def maneuver_agreement(result: FitResult) -> ManeuverAgreement | None:
-    """Return the scatter of the maneuvers of a joint fit; None if the method gives no influence."""
+def maneuver_agreement(names: tuple[str, ...], known: Uncertainty) -> ManeuverAgreement | None:
+    """Return the scatter of the maneuvers of a joint fit; None if the method gives no influence.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Common parameters, which come first.
+    known : Uncertainty
+        Its details have the influence; noise alone is in its covariance.
+    """
     influence, information_share = (
-        result.details.get("maneuver_influence"),
-        result.details.get("information_share"),
+        known.details.get("maneuver_influence"),
+        known.details.get("information_share"),
     )
-    count = len(result.model.parameter_names)
+    count = len(names)
     if (
         not isinstance(influence, np.ndarray)
         or not isinstance(information_share, np.ndarray)
         or len(influence) < 2
     ):
         return None
-    variance = np.diag(result.covariance)[:count]
     return scatter_test(
-        result.names[:count], influence[:, :count], information_share[:, :count], variance
+        names, influence[:, :count], information_share[:, :count], known.variance[:count]
     )
 
 
@@ -130,26 +137,16 @@ def scatter_test(
     )
 
 
-def inflate_covariance(result: FitResult, found: ManeuverAgreement | None) -> FitResult:
-    """Return the result, its covariance inflated by Birge ratios, with a warning for each."""
+def inflate_covariance(known: Uncertainty, found: ManeuverAgreement | None) -> Uncertainty:
+    """Return the covariance inflated by Birge ratios, with a warning for each."""
     if found is None or not np.any(found.factor > 1.0):
-        return result
-    factor = np.ones(len(result.names))
-    factor[: len(found.factor)] = found.factor
-    warnings = tuple(
-        f"maneuvers do not agree on {name}: they scatter {found.factor[k]:.1f} times its interval"
-        f" (chi-square {found.chi_square[k]:.1f} on {found.maneuvers[k] - 1.0:.1f}), widened to it"
-        for k, name in enumerate(found.names)
-        if found.factor[k] > 1.0
-    )
-    freedom = result.degrees_of_freedom.copy()
+        return known
     inflated = np.flatnonzero(found.factor > 1.0)
-    freedom[inflated] = np.minimum(
-        freedom[inflated], np.maximum(found.maneuvers[inflated] - 1.0, 1.0)
+    warnings = (
+        f"maneuvers do not agree on {found.names[k]}: they scatter {found.factor[k]:.1f} times its"
+        f" interval (chi-square {found.chi_square[k]:.1f} on {found.maneuvers[k] - 1.0:.1f}),"
+        " widened to it"
+        for k in inflated
     )
-    return replace(
-        result,
-        covariance=result.covariance * np.outer(factor, factor),
-        degrees_of_freedom=freedom,
-        warnings=(*result.warnings, *warnings),
-    )
+    freedom = found.maneuvers[inflated] - 1.0
+    return known.times(found.factor).of_a_sample(inflated, freedom, *warnings)

@@ -9,7 +9,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.sysid.estimators.output_error_fit import fit_output_error
+from host.sysid.estimators.multistart import multistart
 from host.sysid.maneuvers.maneuver_detection import LEAD_S
 from host.sysid.models.diagnostics import SignalFit, signal_fits
 from host.sysid.models.fit_result import FitResult
@@ -186,19 +186,13 @@ def frozen_at(model: LinearModel, theta: Array) -> LinearModel:
 def _fitted_run(frozen: LinearModel, maneuver: Maneuver) -> FreeRun:
     try:
         problem = output_problem(frozen, [maneuver])
-        # Nothing but constants is free here, which the door would refuse.
-        best = fit_output_error(
-            frozen,
-            [maneuver],
-            coloured_noise=False,
-            start=problem.first_guess(),
-            multiple_starts=False,
-        )
+        start = problem.first_guess()
+        problem.check_start(start)
+        best = multistart(problem, start, multiple_starts=False)
     except IdentificationError:
         return _diverged(frozen, maneuver)
-    return FreeRun(
-        best.fitted[0], _states(frozen, maneuver, best.estimate), _biases(frozen, best.estimate)
-    )
+    outputs = best.responses[0].y.T.copy()
+    return FreeRun(outputs, _states(frozen, maneuver, best.theta), _biases(frozen, best.theta))
 
 
 def _trimmed_run(frozen: LinearModel, maneuver: Maneuver) -> FreeRun:

@@ -7,8 +7,6 @@ Errors are drawn at random, constants of each maneuver are fitted to them as to 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy import special
 
@@ -66,7 +64,7 @@ def excess_over_noise_model(
         block = block_length(maneuver.dt_s)
         left = block_means(problem.residual(number, response.y).T, block, maneuver.sampled)
         slopes = slopes_of_means(problem, number, response)[:, :, problem.n_common :]
-        errors_drawn = random_errors(rng, wide, result, process, maneuver, block)
+        errors_drawn = random_errors(rng, wide, free.theta, result, maneuver, block)
         for j, errors in enumerate(errors_drawn[:, :, :AR_DRAWS]):
             none = [np.zeros((len(errors), 0))] * AR_DRAWS
             moments[j] += lagged_moments(list(errors.T), none, HIGHEST_ORDER)
@@ -108,8 +106,8 @@ def rarely_exceeded(squares: Array) -> Array:
 def random_errors(
     rng: np.random.Generator,
     wide: LinearModel,
+    estimate: Array,
     result: FitResult,
-    process: Sequence[str],
     maneuver: Maneuver,
     block: int,
 ) -> Array:
@@ -122,17 +120,17 @@ def random_errors(
     rng : numpy.random.Generator
     wide : LinearModel
         With the states that process noise drives.
+    estimate : Array
+        Its first entries are the parameters of the model.
     result : FitResult
-        Of filter error.
-    process : sequence of str
-        Those states.
+        Of filter error, whose noise it is.
     maneuver : Maneuver
         Gives how long, and at which samples each output is measured.
     block : int
         Samples of a mean.
     """
-    A, _, C, _ = wide.matrices(result.estimate[: len(wide.parameters)])
-    index = [wide.states.index(s) for s in process]
+    A, _, C, _ = wide.matrices(estimate[: len(wide.parameters)])
+    index = [wide.states.index(s) for s in driven_states(result)]
     intensity = np.zeros(len(A))
     intensity[index] = np.asarray(result.details["process_deviation"]) ** 2
     F, covariance = discrete_noise(A, intensity, block * maneuver.dt_s)

@@ -26,6 +26,7 @@ from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.uncertainty import Uncertainty
 from host.sysid.numerics.ar_noise import ArNoise, autocovariance
 from host.sysid.numerics.input_coherence import InputCoherence, block_length, block_means
 from host.sysid.validation.free_simulation import free_responses, weighted_fit
@@ -71,6 +72,7 @@ class Prediction:
 def predictions(
     model: LinearModel,
     result: FitResult,
+    known: Uncertainty,
     noise: InputCoherence | None,
     maneuvers: Sequence[Maneuver],
     simulated: Sequence[Array],
@@ -82,7 +84,8 @@ def predictions(
     ----------
     model : LinearModel
     result : FitResult
-        With the covariance of all errors.
+    known : Uncertainty
+        What is not known of it, every error in it.
     noise : InputCoherence or None
         Of the maneuvers that were fitted.
     maneuvers : sequence of Maneuver
@@ -108,11 +111,13 @@ def predictions(
     rms = np.sqrt(np.mean(np.vstack(errors) ** 2, axis=0)) / np.maximum(spread, 1e-300)
     process = driven_states(result)
     own = model if process and set(process) <= set(model.states) else None
-    largest = largest_rms(model, result, noise, maneuvers, own) / np.maximum(spread, 1e-300)
+    largest = largest_rms(model, result, known, noise, maneuvers, own) / np.maximum(spread, 1e-300)
     made = largest if own else np.full(len(rms), -np.inf)
     if process and own is None and airspeed_mps is not None:
         wide = driven_model(model, process, airspeed_mps)
-        made = largest_rms(model, result, noise, maneuvers, wide) / np.maximum(spread, 1e-300)
+        made = largest_rms(model, result, known, noise, maneuvers, wide) / np.maximum(
+            spread, 1e-300
+        )
     return {
         name: Prediction(float(rms[k]), float(largest[k]), bool(rms[k] <= made[k]))
         for k, name in enumerate(model.outputs)
@@ -127,6 +132,7 @@ def missed(fits: Sequence[SignalFit]) -> bool:
 def largest_rms(
     model: LinearModel,
     result: FitResult,
+    known: Uncertainty,
     noise: InputCoherence,
     maneuvers: Sequence[Maneuver],
     driven: LinearModel | None = None,
@@ -137,7 +143,7 @@ def largest_rms(
     those of `noise`, or with a model whose states gusts drive (`driven`) what these make.
     """
     count, outputs = len(model.parameter_names), len(model.outputs)
-    root = covariance_root(result.covariance[:count, :count])
+    root = covariance_root(known.covariance[:count, :count])
     rng = np.random.default_rng(DRAW_SEED)
     parameters = rng.standard_normal((DRAWS, count)) @ root.T
     squares, samples = np.zeros((DRAWS, outputs)), 0
@@ -150,7 +156,7 @@ def largest_rms(
         means = slopes.shape[1]
         if driven is not None:
             block = block_length(maneuver.dt_s)
-            errors = random_errors(rng, driven, result, driven_states(result), maneuver, block)
+            errors = random_errors(rng, driven, result.estimate, result, maneuver, block)
         else:
             errors = scale[:, None, :] * np.stack(
                 [
