@@ -58,6 +58,7 @@ def run(args: argparse.Namespace) -> int:
     """Identify what is new, and print what the type is."""
     try:
         import bokeh  # noqa: F401  the dashboard
+        import cryptography  # noqa: F401  the scheduler's keys
         import distributed  # noqa: F401
         import pyarrow  # noqa: F401
     except ImportError as error:

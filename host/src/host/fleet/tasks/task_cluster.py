@@ -41,6 +41,7 @@ _SETTINGS = {
 }
 _LOCAL = ("127.0.0.1", "localhost", "::1")
 _DASHBOARD = 8787
+_GUARD = "host.fleet.tasks.dashboard_guard"
 _WORKERS_S = 30.0  # until the first worker of a cluster that is starting
 _MOST_TRIED = 50  # files of each kind that a worker is asked to open before it gets flights
 
@@ -157,7 +158,7 @@ def _client(
 
 @contextlib.contextmanager
 def _local(options: ClusterOptions, tell: Callable[[str], None]) -> Iterator[Client]:
-    from distributed import Client, LocalCluster
+    from distributed import Client, LocalCluster, Security
 
     from host.fleet.tasks.guarded_child import ONE_THREAD
 
@@ -170,6 +171,10 @@ def _local(options: ClusterOptions, tell: Callable[[str], None]) -> Iterator[Cli
             host=HERE,
             dashboard_address=f"{HERE}:{_free(_DASHBOARD)}",
             memory_limit=0,
+            # Whoever reaches a scheduler runs programs: keys of this run alone, held in memory.
+            security=Security.temporary(),
+            preload=[_GUARD],
+            scheduler_kwargs={"preload": [_GUARD]},
             silence_logs=logging.CRITICAL,
         )
     except (OSError, RuntimeError) as error:
