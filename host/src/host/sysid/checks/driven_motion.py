@@ -67,10 +67,14 @@ class SensorTolerances:
 
 @dataclass(frozen=True, slots=True)
 class _Seen:
-    """A signal and its past: along what surfaces explain at most, and all else of it."""
+    """A signal and its past: along what surfaces explain at most, and all else of it.
+
+    All else is held in an orthonormal basis that the signals of one identity share: sums of
+    squares are all that is asked of it, for hundreds of factors.
+    """
 
     along: Array  # (instruments, past + 1)
-    rest: Array  # (steps, past + 1)
+    rest: Array  # (signals times past + 1, past + 1)
 
     def plus(self, factor: float, other: _Seen) -> _Seen:
         """Return the sum with another signal, so many times."""
@@ -86,13 +90,15 @@ class DrivenTest:
         self._own = _basis(own)
         self._basis = _basis(_off(np.column_stack(columns), self._own))
         self.instruments = self._basis.shape[1]
-        self.rate, self.delayed = self._seen(law.rate), {}
-        self.parts = {name: self._seen(part) for name, part in law.parts.items()}
-        self.terms = {name: self._seen(term) for name, term in law.terms.items()}
-        for name, values in (("", law.rate), *law.parts.items()):
+        values = [law.rate, *law.parts.values(), *law.terms.values()]
+        self.rate, *seen = self._together(values)
+        self.parts = dict(zip(law.parts, seen, strict=False))
+        self.terms = dict(zip(law.terms, seen[len(law.parts) :], strict=True))
+        self._delayed = []
+        for name, one in (("", law.rate), *law.parts.items()):
             delay_s = law.delays_s.get(name, SENSOR_DELAY_S)
-            self.delayed[name] = self._seen(delay_s * np.gradient(values, law.step_s))
-        self._errors = [self._seen(error) for error in law.sensors]
+            self._delayed.append(self._split(delay_s * np.gradient(one, law.step_s))[0])
+        self._errors = [self._split(error)[0] for error in law.sensors]
 
     def misfit(self, scaled: str = "", factor: float = 1.0) -> float:
         """Return how many deviations squared what surfaces explain of the identity is from none.
@@ -122,24 +128,31 @@ class DrivenTest:
             left = left.plus(1.0 - factor, (self.parts | self.terms)[scaled])
         beta, *_ = np.linalg.lstsq(left.rest[:, 1:], left.rest[:, 0], rcond=None)
         weights = np.concatenate([[1.0], -beta])
-        free = len(left.rest) - len(beta) - self._own.shape[1] - self.instruments
+        free = len(self._own) - len(beta) - self._own.shape[1] - self.instruments
         variance = float(np.sum((left.rest @ weights) ** 2)) / free
         variance += within.unknown**2 * float(np.mean((self.rate.along @ weights) ** 2))
         covariance = variance * np.eye(len(left.along))
         signals = self.parts | {"": self.rate}
-        errors = [(share, signals[name]) for name, share in within.shares.items()]
-        errors += [(1.0, one) for one in self._errors]
-        errors += [(within.delays, one) for one in self.delayed.values()]
-        for size, one in errors:
-            error = size * (one.along @ weights)
+        errors = [share * signals[name].along for name, share in within.shares.items()]
+        errors += [*self._errors, *(within.delays * one for one in self._delayed)]
+        for along in errors:
+            error = along @ weights
             covariance += np.outer(error, error)
         return left.along @ weights, covariance
 
-    def _seen(self, values: Array) -> _Seen:
+    def _together(self, signals: Sequence[Array]) -> list[_Seen]:
+        """Return signals and their pasts, all else of them in one basis of their own."""
+        split = [self._split(values) for values in signals]
+        triangle = np.linalg.qr(np.column_stack([rest for _, rest in split]), mode="r")
+        parts = np.split(triangle, len(split), axis=1)
+        return [_Seen(along, rest) for (along, _), rest in zip(split, parts, strict=True)]
+
+    def _split(self, values: Array) -> tuple[Array, Array]:
+        """Return a signal and its past along the instruments, and all else of it row by row."""
         back = np.lib.stride_tricks.sliding_window_view(values, PAST_STEPS + 1)[:, ::-1]
         back = _off(back, self._own)
         along = self._basis.T @ back
-        return _Seen(along, back - self._basis @ along)
+        return along, back - self._basis @ along
 
 
 def driven_misfit(law: Identity) -> float | None:
