@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import time
 import tracemalloc
-import zlib
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,6 @@ import pytest
 from host.errors import IdentificationError
 from host.readers.foreign_tables import read_foreign
 from pyarrow import parquet
-from scipy import io
 
 
 def written(path: Path, table: pa.Table, **how: object) -> Path:
@@ -84,14 +82,3 @@ def test_what_pandas_writes_is_read_as_before(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.columns["said"], [1.5, 2.0])
     np.testing.assert_array_equal(found.columns["at"], [0.0, 2.0])
     np.testing.assert_array_equal(found.columns["index"], [3.0, 4.0])
-
-
-def test_what_a_mat_file_expands_to_is_asked(tmp_path: Path) -> None:
-    io.savemat(tmp_path / "plain.mat", {"a": np.zeros(100)})
-    head = (tmp_path / "plain.mat").read_bytes()[:128]
-    body = zlib.compress(bytes(400_000_000), 9)
-    path = tmp_path / "bomb.mat"
-    path.write_bytes(head + (15).to_bytes(4, "little") + len(body).to_bytes(4, "little") + body)
-    refused(path, "its compressed parts expand, ")
-    io.savemat(tmp_path / "good.mat", {"a": np.arange(100.0)}, do_compression=True)
-    assert len(read_foreign(tmp_path / "good.mat").columns["a"]) == 100

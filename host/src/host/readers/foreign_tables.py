@@ -14,7 +14,7 @@ from host.arrays import Array
 from host.errors import IdentificationError
 from host.physical.calibration import Calibration
 from host.physical.recording import Recording
-from host.readers.expanded_size import ask_expanded_size
+from host.readers.mat_arrays import CELL, MatError, Struct, read_arrays
 from host.readers.parquet_table import read_parquet
 from host.readers.text_table import HEAD_BYTES, read_text
 
@@ -140,7 +140,7 @@ def _from_text(found: Foreign, name: str, values: pd.Series[Any]) -> None:
     text = values.astype("string").str.strip()
     numbers = pd.to_numeric(text, errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan)
     odd = np.flatnonzero(np.isnan(numbers) & (text.fillna("") != "").to_numpy(dtype=bool))
-    if len(odd) < 0.5 * len(text):
+    if not len(odd) or len(odd) < 0.5 * len(text):
         found.columns[name] = numbers
         above = int(np.sum(odd == np.arange(len(odd))))  # units and types below the names
         odd = odd[above:] if above <= MOST_UNIT_ROWS else odd
@@ -165,75 +165,64 @@ def _seconds(instants: pd.Series[Any]) -> Array:
 
 
 def _mat(source: Path, head: bytes) -> Foreign:
-    from scipy import io
-
     if head.startswith(b"MATLAB 7.3") or b"\x89HDF\r\n" in head[:1024]:
         raise IdentificationError(
             f"{source}: a MAT file of version 7.3 (HDF5); in MATLAB: s = load('{source.name}');"
             " save('as7.mat', '-struct', 's', '-v7')"
         )
-    ask_expanded_size(source)
     try:
-        content = io.loadmat(source, squeeze_me=True, struct_as_record=True)
-    except Exception as error:  # scipy names no common ancestor of what damaged files raise
+        leaves = [
+            leaf
+            for name, value in read_arrays(source)
+            if not name.startswith("__")
+            for leaf in _leaves(name, value)
+        ]
+    except MatError as error:
         raise IdentificationError(f"{source}: not a MAT file of version 4 to 7: {error}") from error
     found = Foreign()
-    leaves = [
-        leaf
-        for name, value in content.items()
-        if not name.startswith("__")
-        for leaf in _leaves(name, value)
-    ]
     short = Counter(name.rsplit(".", 1)[-1] for name, _ in leaves)
     for name, value in leaves:
         last = name.rsplit(".", 1)[-1]
         for label in {name, last} if short[last] == 1 else {name}:
-            why = _no_column(value)
-            if why:
-                found.unusable[label] = why
-                if value.ndim == 2 and value.dtype.kind in "fiub":
+            if isinstance(value, str):
+                found.unusable[label] = value
+            elif value.ndim > 1:
+                found.unusable[label] = _no_column(value)
+                if value.ndim == 2:
                     found.columns |= _of_matrix(label, value)
             elif value.size > 1:
-                found.columns[label] = value.astype(np.float64)
+                found.columns[label] = value
     return found
 
 
-def _leaves(name: str, value: object) -> Iterator[tuple[str, Any]]:
+def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
     """Walk through structs; a field of many structs is one array."""
-    array = np.asarray(value)
-    if array.dtype.names and "_TypeSystem" not in array.dtype.names:
-        for part in array.dtype.names:
-            inner = array[part]
-            if inner.shape == ():
-                yield from _leaves(f"{name}.{part}", inner.item())
+    if isinstance(value, Struct):
+        for part, values in value.fields.items():
+            if len(values) == 1:
+                yield from _leaves(f"{name}.{part}", values[0])
+            elif all(isinstance(one, np.ndarray) and one.size == 1 for one in values):
+                yield f"{name}.{part}", np.array([float(one.item()) for one in values])
             else:
-                try:
-                    yield f"{name}.{part}", inner.astype(np.float64)
-                except (ValueError, TypeError):
-                    yield f"{name}.{part}", inner
+                yield f"{name}.{part}", CELL
+    elif isinstance(value, np.ndarray) and value.ndim <= 2:
+        yield name, value.astype(np.float64, copy=False)
     else:
-        yield name, array
+        yield name, value
 
 
 def _of_matrix(label: str, values: Any) -> dict[str, Array]:
     """Return the columns of a matrix, or the rows of a wide one, under the names MATLAB has."""
-    table = np.asarray(values, dtype=np.float64)
-    if table.shape[0] >= table.shape[1]:
-        return {f"{label}(:,{k})": column for k, column in enumerate(table.T, start=1)}
-    return {f"{label}({k},:)": row for k, row in enumerate(table, start=1)}
+    if values.shape[0] >= values.shape[1]:
+        return {f"{label}(:,{k})": column for k, column in enumerate(values.T, start=1)}
+    return {f"{label}({k},:)": row for k, row in enumerate(values, start=1)}
 
 
 def _no_column(array: Any) -> str:
-    if array.dtype.names or array.dtype.kind == "V":
-        return "a MATLAB object (table, timeseries): save table2struct(T, 'ToScalar', true)"
-    if array.dtype.kind == "O":
-        return "a cell array or a MATLAB object, not numbers"
-    if array.dtype.kind not in "fiub":
-        return "text" if array.dtype.kind in "US" else "not of real numbers"
     size = " x ".join(map(str, array.shape))
     if array.ndim == 2:
         return f"a {size} array: name one of its columns, as (:,2), or rows, as (2,:)"
-    return f"a {size} array, not one column" if array.ndim > 1 else ""
+    return f"a {size} array, not one column"
 
 
 def same_length(columns: Mapping[str, Array], source: str) -> None:
