@@ -18,7 +18,7 @@ from host.sysid.errors.trim_departure import spin_of
 from host.sysid.estimators import fit
 from host.sysid.estimators.start_values import regression_estimates, start_values
 from host.sysid.flight.reconstructed_flight import flown_maneuvers, reconstruct_flight
-from host.sysid.linear import gust_at_trim, linear_estimator
+from host.sysid.linear import gust_at_trim, linear_estimator, linear_fit
 from host.sysid.linear.linear_model import imu_place_m, without_attitude
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models import FitResult, Trim, template
@@ -108,7 +108,7 @@ def test_airspeed_that_falls_with_the_rudder_is_not_taken_for_a_derivative(
 
     moved = misses()
 
-    for module in (linear_estimator, gust_at_trim):
+    for module in (linear_fit, gust_at_trim):
         monkeypatch.setattr(module, "correct_trim_departure", lambda *_: None)
     plain = misses()
     for name in ("Cn_p", "Cn_da"):
@@ -222,7 +222,7 @@ def test_a_fit_that_ran_away_is_one_line(
         found = fit(*given, **options)
         return replace(found, covariance=np.full_like(found.covariance, np.nan))
 
-    monkeypatch.setattr(linear_estimator, "fit", ran_away)
+    monkeypatch.setattr(linear_fit, "fit", ran_away)
     with pytest.raises(IdentificationError, match="the covariance is not finite; these data do no"):
         identify(columns, names=("lateral",), windows=windows(maneuvers))
 

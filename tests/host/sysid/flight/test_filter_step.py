@@ -7,7 +7,7 @@ from host.physical.recording import AUTOPILOT, FOREIGN, OWN
 from host.readers.column_sampling import sampled_name
 from host.sysid.flight.filter_step import with_filter_step
 from host.sysid.flight.reconstructed_flight import FlownManeuver, ReconstructedFlight
-from host.sysid.linear.linear_model import model_and_method
+from host.sysid.linear.linear_model import template_and_method
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models import Trim, template
 from host.sysid.reconstruction.reconstruction import Compatibility
@@ -77,7 +77,7 @@ def test_a_slow_gyro_of_ours_has_no_means_and_no_filter_at_a_shorter_step(
     maker: str, dt_s: float, slow: str, method: str
 ) -> None:
     flown = [_flown(dt_s, known=True, maker=maker, slow=(slow,))]
-    _, chosen, remarks = model_and_method(flown, Trim(18.0), "lateral", "flight", None)
+    _, chosen, remarks = template_and_method(flown, Trim(18.0), "lateral", "flight")
     assert chosen == method
     assert any("no means over 20 ms" in line for line in remarks) == (method != "filter-error-gust")
 

@@ -121,6 +121,10 @@ class Finding:
         causes = f"; likely {' or '.join(self.causes)}" if self.causes else ""
         return f"{where}finding {self.check}: {self.text}{causes}; {self.done}"
 
+    def accepted_if(self, checks: Collection[str]) -> Finding:
+        """Return the finding as the user accepted it if its check is one of these."""
+        return self.accept() if self.check in checks and not self.accepted else self
+
     def accept(self) -> Finding:
         """Return the finding as the user accepted it: what it left out is used as it is."""
         used = self.closed or self.done.startswith(AS_IT_IS)

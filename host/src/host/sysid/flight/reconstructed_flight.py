@@ -22,6 +22,7 @@ from host.near_names import like
 from host.physical.recording import OWN, SURFACES
 from host.readers.column_sampling import sampled_name
 from host.sysid.checks.data_finding import Finding
+from host.sysid.flight.column_change import Record, change_of
 from host.sysid.flight.input_kinks import with_means_of_motion
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models.maneuver import Maneuver
@@ -76,6 +77,8 @@ class ReconstructedFlight:
         Of its sensors, where a calibration says better than what is usual of the maker's.
     calibration_alone : Compatibility or None
         Of sensors that came to no agreement: all that their calibration leaves open.
+    record : tuple of ColumnChange
+        What was done to `corrected`, and why.
     """
 
     source: str
@@ -93,6 +96,7 @@ class ReconstructedFlight:
     maker: str = OWN
     errors: InstrumentErrors | None = None
     calibration_alone: Compatibility | None = None
+    record: Record = ()
 
     @property
     def least_noise(self) -> dict[str, float]:
@@ -217,14 +221,19 @@ def reconstruct_flight(
     sensor_errors = {c.name: c.value for c in corrections(compatibility)} if compatibility else {}
     delays_open = True
     if airframe is not None and compatibility is not None and compatibility.instrument is not None:
-        corrected = columns_at_cg(columns, airframe, compatibility)
+        at_cg = columns_at_cg(columns, airframe, compatibility)
         delays_open = False
     else:
-        corrected = advance_delayed(columns, sensor_errors)
+        at_cg = advance_delayed(columns, sensor_errors)
         if airframe is not None:
-            corrected = transfer_to_cg(corrected, airframe)
+            at_cg = transfer_to_cg(at_cg, airframe)
+    corrected = at_cg
     if compatibility is not None:
-        corrected = correct_columns(corrected, sensor_errors, pressure_share(compatibility))
+        corrected = correct_columns(at_cg, sensor_errors, pressure_share(compatibility))
+    record = (
+        *change_of(columns, at_cg, "as sensors without delay at the CG", "the aircraft file"),
+        *change_of(at_cg, corrected, "sensor errors removed", "the reconstruction estimates them"),
+    )
     return ReconstructedFlight(
         source,
         columns,
@@ -236,6 +245,7 @@ def reconstruct_flight(
         tuple(findings),
         resolution or {},
         maker=maker,
+        record=record,
     )
 
 

@@ -19,53 +19,37 @@ from host.sysid.estimators.servo_parameters import (
 from host.sysid.estimators.start_values import start_values_of
 from host.sysid.flight.reconstructed_flight import FlownManeuver, ReconstructedFlight
 from host.sysid.linear.first_departures import remove_departures
+from host.sysid.linear.linear_model import ChosenModel
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.reconstruction.servo_response import behind_servos
 
 
-def servo_of(
-    model: LinearModel,
-    used: Sequence[FlownManeuver],
-    airspeed_mps: float | None,
-    departures: Sequence[Array],
-) -> tuple[ServoEstimate | None, str]:
+def servo_of(chosen: ChosenModel, departures: Sequence[Array]) -> tuple[ServoEstimate | None, str]:
     """Return the servos of the commanded inputs of a model, and a remark; None without any.
 
     Parameters
     ----------
-    model : LinearModel
-        Delays and places of sensors are left out: what all sensors have in common is the servos'
-        delay.
-    used : sequence of FlownManeuver
-        Those of the fit.
-    airspeed_mps : float or None
-        Of the trim where the gust is a state; None: output error.
+    chosen : ChosenModel
     departures : sequence of Array
         What departures from the trim do to the outputs of each maneuver: without them.
     """
-    flights = {id(m.flight): m.flight for m in used}.values()
-    commands = {u for f in flights for u in f.commands if f.servo is not None}
-    commanded = [u for u in model.inputs if u in commands]
-    prior = next((f.servo for f in flights if f.servo is not None), None)
-    if not commanded or prior is None:
+    flights = [m.flight for m in chosen.used if m.flight.servo is not None]
+    commands = {u for f in flights for u in f.commands}
+    commanded = [u for u in chosen.model.inputs if u in commands]
+    if not commanded or flights[0].servo is None:
         return None, ""
-    places = {x.parameter for x in model.accelerometer_offsets}
-    plain = replace(
-        model,
-        delays=(),
-        accelerometer_offsets=(),
-        parameters=tuple(p for p in model.parameters if p.name not in places),
-    )
+    prior, plain = flights[0].servo, _without_places(chosen.model)
 
     def behind(values: tuple[float, float, float]) -> list[Maneuver]:
-        return remove_departures([m.cut(plain) for m in brought_behind(used, values)], departures)
+        moved = brought_behind(chosen.used, values)
+        return remove_departures([m.cut(plain) for m in moved], departures)
 
     remark = ""
-    if airspeed_mps is not None:
+    if chosen.gust_is_state:
         try:
-            by = _with_gust(airspeed_mps)
+            by = _with_gust(chosen.trim.airspeed_mps)
             return estimate_servo(plain, behind, commanded, prior, by, _white), ""
         except IdentificationError as error:
             remark = f"the servos are those of output error: {error}"
@@ -74,6 +58,17 @@ def servo_of(
     except IdentificationError as error:
         considered = considered_servo(plain, behind, commanded, prior, _white)
         return considered, f"the servos were not estimated ({error}): carried as they usually are"
+
+
+def _without_places(model: LinearModel) -> LinearModel:
+    """Return a model without delays and places: what all sensors share is the servos' delay."""
+    places = {x.parameter for x in model.accelerometer_offsets}
+    return replace(
+        model,
+        delays=(),
+        accelerometer_offsets=(),
+        parameters=tuple(p for p in model.parameters if p.name not in places),
+    )
 
 
 def _white(model: LinearModel, data: Sequence[Maneuver], near: FitResult | None) -> FitResult:

@@ -8,44 +8,50 @@ explained to 9.5 % with it and to 1.0 % without, and the servos came out 6 ms la
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from host.aircraft.mass_properties import AirframeData
+from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.sysid.errors.trim_departure import Departure
+from host.sysid.errors.trim_departure import correct_trim_departure, spin_of
+from host.sysid.estimators.gust_model import VANES
 from host.sysid.estimators.method_registry import fit
-from host.sysid.flight.reconstructed_flight import FlownManeuver
-from host.sysid.models.fit_result import FitResult
+from host.sysid.linear.linear_model import ChosenModel
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
-
-# Of a fit, its maneuvers and all columns of each.
-DepartureOf = Callable[
-    [FitResult, Sequence[Maneuver], Sequence[Mapping[str, Array]]], Departure | None
-]
 
 
 def first_departures(
-    model: LinearModel, used: Sequence[FlownManeuver], departure_of: DepartureOf
+    chosen: ChosenModel, airframe: AirframeData | None, powerplant: Powerplant | None
 ) -> list[Array]:
     """Return the part of the outputs that departures from the trim cause, (samples, p) each.
 
-    Zero where no fit is found.
+    Zero of a model of the user's own, where a vane measured the angles, and where no fit is found.
 
     Parameters
     ----------
-    model : LinearModel
-        Without delays.
-    used : sequence of FlownManeuver
-    departure_of : callable
-        Finds them at a fit.
+    chosen : ChosenModel
+    airframe : AirframeData or None
+    powerplant : Powerplant or None
+        Gives the rotor's spin.
     """
-    data = [m.cut(model) for m in used]
+    angles = set(chosen.model.states) & set(VANES)
+    hidden = any(
+        m.flight.angles is not None or angles - set(m.flight.corrected) for m in chosen.used
+    )
+    bare = replace(chosen.model, delays=())
+    data = [m.cut(bare) for m in chosen.used]
     still: Sequence[Maneuver] = data
+    if not hidden or not chosen.trim.known or chosen.own:
+        return [np.zeros_like(m.outputs) for m in data]
     with contextlib.suppress(IdentificationError):
-        rough = fit("output-error-white", model, data, multiple_starts=False)
-        departure = departure_of(rough, data, [m.departing() for m in used])
+        rough = fit("output-error-white", bare, data, multiple_starts=False)
+        cuts = [m.departing() for m in chosen.used]
+        spin = spin_of(powerplant, cuts)
+        departure = correct_trim_departure(rough, data, cuts, airframe, chosen.trim, spin)
         if departure is not None:
             still = departure.removed_from(data, rough.estimate + departure.step)
     return [m.outputs - s.outputs for m, s in zip(data, still, strict=True)]

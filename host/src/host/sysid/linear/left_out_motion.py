@@ -8,12 +8,10 @@ out is in their intervals. On records of 1.5 to 5 s of a trainer N_beta of `dutc
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
-from host.aircraft.mass_properties import AirframeData
-from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.aerodynamics.left_out_terms import LEFT_OUT_TERMS, NEEDED
 from host.sysid.aerodynamics.thrust_terms import thrust_terms
@@ -24,122 +22,70 @@ from host.sysid.estimators.gust_model import gust_deviation_mps
 from host.sysid.estimators.gust_penetration import penetration_of
 from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.noise_model_comparison import DECISIVE, bayes_criterion
-from host.sysid.estimators.users_model import GUST, no_filter, no_gust_state
+from host.sysid.estimators.users_model import no_filter, no_gust_state
+from host.sysid.linear.linear_model import DEFAULT_METHOD, GUST, ChosenModel
+from host.sysid.linear.linear_stages import LinearFit
+from host.sysid.linear.prepared_columns import PreparedColumns
 from host.sysid.models.fit_result import FitResult, without_parameters
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.models.templates import Trim
 
 # Of a term, from what is usual: gusts that turned both passed for it at 4 to 9, in calm air it was
 # at most 1.4.
 LIKELY_SD = 2.0
 
 
-@dataclass(frozen=True)
-class LeftOutFit:
-    """A fit on the reduced template alone, and what was beside it.
-
-    Attributes
-    ----------
-    result : FitResult
-    departure : Departure
-    unlikely : tuple of str
-        Columns of which the fit says what no aircraft has.
-    model : LinearModel
-        As fitted; of a filter with the parameters of turning air, without delays.
-    maneuvers : tuple of Maneuver
-        As fitted: a filter gets its outputs without delays.
-    in_gusts : bool
-        By filter error with the gust as a state.
-    delays : dict
-        What was taken out: value and 95 % half-width, s.
-    """
-
-    result: FitResult
-    departure: Departure
-    unlikely: tuple[str, ...]
-    model: LinearModel
-    maneuvers: tuple[Maneuver, ...]
-    in_gusts: bool = False
-    delays: dict[str, tuple[float, float]] = field(default_factory=dict)
-
-
 def unaccounted_motion(
-    model: LinearModel, departure: Departure | None, beside: LeftOutFit | None
+    chosen: ChosenModel, found: LinearFit, departure: Departure | None
 ) -> tuple[str, ...]:
-    """Return what moves beside a template, acts in its equations and is in no interval.
-
-    Parameters
-    ----------
-    model : LinearModel
-    departure : Departure or None
-        None of a template that was fitted alone.
-    beside : LeftOutFit or None
-    """
-    if beside is not None:
-        return beside.unlikely
-    needed = () if departure is not None else NEEDED.get(model.name, ())
-    return tuple(c for c in needed if c not in model.states)
+    """Return what moves beside a template, acts in its equations and is in no interval."""
+    if chosen.own or departure is not None:
+        return found.left_out
+    needed = NEEDED.get(found.model.name, ())
+    return tuple(c for c in needed if c not in found.model.states)
 
 
 def fit_beside_left_out(
-    method: str,
-    model: LinearModel,
-    data: Sequence[Maneuver],
-    cuts: Sequence[Mapping[str, Array]],
-    trim: Trim,
-    airframe: AirframeData | None,
-    spin: tuple[float, float],
-    options: Mapping[str, object],
-    *,
-    by_evidence: bool = False,
-) -> LeftOutFit | None:
+    method: str, columns: PreparedColumns, options: Mapping[str, object]
+) -> LinearFit | None:
     """Return the fit of a reduced template; None of another, or where what it needs is missing.
+
+    Where the data show gusts, filter error with the gust stands in place of the default method.
 
     Parameters
     ----------
     method : str
         Of output error, or filter error with the gust: None where that does not converge.
-    model : LinearModel
-    data : sequence of Maneuver
-        As measured.
-    cuts : sequence of mapping
-        All columns of each.
-    trim : Trim
-    airframe : AirframeData or None
-    spin : tuple of float
-        Of the rotor.
+    columns : PreparedColumns
     options : mapping
         Of the method.
-    by_evidence : bool
-        Where the data show gusts, filter error with the gust in place of output error.
     """
+    chosen, data, cuts = columns.chosen, columns.data, columns.departing
+    model, trim, airframe = chosen.model, chosen.trim, columns.airframe
     reduced = model.name in LEFT_OUT_TERMS
     # Of thrust the gust filter of other templates takes care by itself (`gust_at_trim`).
     if not reduced and (method == GUST or not thrust_terms(model, cuts, trim, airframe)):
         return None
     rough = fit("output-error-white", replace(model, delays=()), data, multiple_starts=False)
-    found = correct_trim_departure(rough, data, cuts, airframe, trim, spin)
+    found = correct_trim_departure(rough, data, cuts, airframe, trim, columns.spin)
     if found is None:
         return None
-    speed = trim.airspeed_mps if trim.known else None
     if method == GUST:
-        return _in_gusts(None, found, model, data, speed)
+        return _in_gusts(None, found, columns)
     wide = _fit(method, found.wide_model(model), found.maneuvers, options)
-    moving = _in_gusts(wide, found, model, data, speed) if by_evidence and reduced else None
-    return _alone(wide, found, model, data) if moving is None else moving
+    by_evidence = reduced and chosen.asked == DEFAULT_METHOD
+    moving = _in_gusts(wide, found, columns) if by_evidence else None
+    return moving or replace(_alone(wide, found, model, data), method=chosen.method)
 
 
 def _in_gusts(
-    wide: FitResult | None,
-    found: Departure,
-    model: LinearModel,
-    data: Sequence[Maneuver],
-    airspeed_mps: float | None,
-) -> LeftOutFit | None:
+    wide: FitResult | None, found: Departure, columns: PreparedColumns
+) -> LinearFit | None:
     """Return a fit with the gust as a state; None if that fails, or does no better than `wide`."""
+    model, trim = columns.chosen.model, columns.chosen.trim
+    airspeed_mps = trim.airspeed_mps
     bare = found.wide_model(replace(model, delays=()))
-    if airspeed_mps is None or no_gust_state(bare, airspeed_mps) or no_filter(bare, data):
+    if not trim.known or no_gust_state(bare, airspeed_mps) or no_filter(bare, columns.data):
         return None
     try:
         first = (
@@ -158,9 +104,8 @@ def _in_gusts(
         return None
     turned = penetration_of(replace(model, delays=()), moving.result.model)
     delays_s = {name: value for name, (value, _) in moving.delays.items()}
-    measured = tuple(advance_outputs(m, model, delays_s) for m in data)
-    done = _alone(moving.result, found, turned, measured)
-    return replace(done, in_gusts=True, delays=moving.delays)
+    measured = [advance_outputs(m, model, delays_s) for m in columns.data]
+    return replace(_alone(moving.result, found, turned, measured), delays=moving.delays)
 
 
 def _where_gusts_are(
@@ -199,7 +144,7 @@ def _first_with_gust(
 
 def _alone(
     wide: FitResult, found: Departure, model: LinearModel, data: Sequence[Maneuver]
-) -> LeftOutFit:
+) -> LinearFit:
     """Return a fit on the template, what is not known of the terms beside it in its covariance."""
     attenuated = {t.name: found.beside[t.name][1] for t in found.varying.left_out if t.attenuated}
     wide = _known_no_better(wide, attenuated)
@@ -210,9 +155,15 @@ def _alone(
         for mean, sd in [found.beside[term.name]]
         if abs(wide.value(term.name) - mean) > LIKELY_SD * sd
     ]
-    departure = found.of_fit(wide, len(result.names))
-    named = tuple(dict.fromkeys(unlikely))
-    return LeftOutFit(result, departure, named, model, tuple(data))
+    return LinearFit(
+        result,
+        model,
+        GUST,
+        tuple(data),
+        result.fitted,
+        departure=found.of_fit(wide, len(result.names)),
+        left_out=tuple(dict.fromkeys(unlikely)),
+    )
 
 
 def _known_no_better(wide: FitResult, deviations: Mapping[str, float]) -> FitResult:

@@ -14,6 +14,7 @@ from host.sysid.aerodynamics.coefficient_table import (
     CoefficientTable,
 )
 from host.sysid.estimators.servo_parameters import ServoEstimate
+from host.sysid.flight.column_change import Record
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models.diagnostics import (
     Collinearity,
@@ -69,6 +70,7 @@ class Answer:
     held_out_runs: tuple[
         tuple[Maneuver, Array], ...
     ] = ()  # held out, with their outputs by free simulation
+    record: Record = ()  # what was done to which columns, and why
 
     @property
     def at_bound(self) -> tuple[str, ...]:

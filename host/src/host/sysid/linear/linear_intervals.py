@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
 from host.instrument.deviations import airspeed_share
@@ -48,34 +47,25 @@ LEAST_COMMANDED = 0.25  # of all samples, in maneuvers that a test input made
 WHITE = "output error (white)"  # its noise is judged beside what the inputs drive
 
 
-def linear_intervals(
-    estimate: LinearEstimate,
-    airframe: AirframeData | None,
-    powerplant: Powerplant | None,
-    *,
-    own: bool,
-) -> LinearIntervals:
+def linear_intervals(estimate: LinearEstimate, powerplant: Powerplant | None) -> LinearIntervals:
     """Return the covariance from noise and repeats, and from every systematic error.
 
     Parameters
     ----------
     estimate : LinearEstimate
-    airframe : AirframeData or None
-        Gives coefficients.
     powerplant : Powerplant or None
         Gives the thrust that turns with the aircraft.
-    own : bool
-        The model is one of the user's own.
     """
     e = estimate
     statistical, coherence = _statistical(e)
-    shifts = _shifts(e, statistical, airframe, own=own)
+    shifts = _shifts(e, statistical)
+    airframe, condition = e.columns.airframe, e.columns.chosen.condition
     found: CoefficientParts | None = None
     if airframe is not None and e.trim.known:
-        instrument = e.used[0].flight.instrument
+        instrument = e.columns.used[0].flight.instrument
         errors = None if instrument is None else instrument.errors
-        thrust = path_thrust(e.cuts, powerplant, airframe, e.trim, e.condition)
-        found = coefficient_parts(statistical, airframe, e.condition, shifts, errors, thrust)
+        thrust = path_thrust(e.columns.cuts, powerplant, airframe, e.trim, condition)
+        found = coefficient_parts(statistical, airframe, condition, shifts, errors, thrust)
     return LinearIntervals(
         statistical, coherence, shifts, add_systematic_covariance(statistical, shifts), found
     )
@@ -87,21 +77,21 @@ def _statistical(e: LinearEstimate) -> tuple[FitResult, InputCoherence | None]:
     Noise, what the model lacks, and the noise of the airspeed are in its covariance.
     """
     at_trim = e.at_trim(e.estimate)  # airspeed that varied is known: what it does is no model error
-    free = free_responses(e.model, e.estimate, at_trim)
+    free = free_responses(e.found.model, e.estimate, at_trim)
     coherence = None if free is None else _coherence(e, free, at_trim)
     of_speed = np.zeros((0, 0)) if e.departure is None else e.departure.airspeed_noise
     noise = _noise(e, free, coherence)
     known = _with_model_error(e, noise, noise.plus(of_speed), free, coherence, at_trim)
     known = known.plus(of_speed)  # this noise is known, no model error multiplies it
     # Our own log is fitted in means, which lean less on what the gust is between samples.
-    if others_recorded(e.used):
+    if others_recorded(e.columns.used):
         known = with_unknown_roll_lag(e.fit.names, e.estimate, known)
     result = replace(
         e.fit,
         estimate=e.estimate,
         covariance=known.covariance,
         degrees_of_freedom=known.degrees_of_freedom,
-        fitted=e.fitted,
+        fitted=e.found.fitted,
         warnings=(*e.warnings, *known.warnings),
         details=dict(known.details),
     )
@@ -118,7 +108,7 @@ def _noise(
         memory, power = coherence.noise, coherence.innovation_variance
         variance = white_fit_variance(free.problem, free.responses, memory, power)
         known = widened_to(known, variance[: len(e.fit.model.parameter_names)])
-    return known.plus(column_noise(e.fit, e.maneuvers, e.trim))
+    return known.plus(column_noise(e.fit, e.found.maneuvers, e.trim))
 
 
 def _with_model_error(
@@ -154,17 +144,17 @@ def _coherence(
     found = _tested(e, free, range(len(at_trim)))
     if not found.suspected:
         return found
-    surfaces = e.model.controls()
+    surfaces = e.found.model.controls()
     chosen = [
         k
-        for k, (flown, columns) in enumerate(zip(e.used, e.cuts, strict=True))
+        for k, (flown, columns) in enumerate(zip(e.columns.used, e.columns.cuts, strict=True))
         if not taken_over(columns, flown.found, surfaces)
     ]
     commanded = [at_trim[k] for k in chosen]
     samples, every = (sum(m.samples for m in some) for some in (commanded, at_trim))
     if samples < LEAST_COMMANDED * every or len(commanded) == len(at_trim):
         return found
-    again = free_responses(e.model, e.estimate, commanded)
+    again = free_responses(e.found.model, e.estimate, commanded)
     if again is None:
         return found
     alone = _tested(e, again, chosen)
@@ -173,11 +163,11 @@ def _coherence(
 
 def _tested(e: LinearEstimate, free: FreeResponses, chosen: Sequence[int]) -> InputCoherence:
     """Return the coherence of some maneuvers, beside what their instrument's file leaves open."""
-    used = [e.used[k] for k in chosen]
+    used = [e.columns.used[k] for k in chosen]
     known = [c for c in map(_carriers(e).__getitem__, chosen) if c is not None]
     beside: list[Array] = []
     if len(known) == len(used):
-        cuts = [e.cuts[k] for k in chosen]
+        cuts = [e.columns.cuts[k] for k in chosen]
         beside = systematic_residuals(free.problem, free.theta, cuts, known, e.trim)
         if kinks := kink_residuals(free.problem, free.theta, used):
             beside = [np.dstack(both) for both in zip(beside, kinks, strict=True)]
@@ -186,35 +176,57 @@ def _tested(e: LinearEstimate, free: FreeResponses, chosen: Sequence[int]) -> In
 
 def _carriers(e: LinearEstimate) -> list[Compatibility | None]:
     """Return what is known of the sensors of each maneuver."""
-    return [m.flight.compatibility or m.flight.calibration_alone for m in e.used]
+    return [m.flight.compatibility or m.flight.calibration_alone for m in e.columns.used]
 
 
-def _shifts(
-    e: LinearEstimate, statistical: FitResult, airframe: AirframeData | None, *, own: bool
-) -> tuple[ShiftedEstimate, ...]:
+def _shifts(e: LinearEstimate, statistical: FitResult) -> tuple[ShiftedEstimate, ...]:
     """Return the estimate moved by one deviation of every systematic error."""
-    shifts: tuple[ShiftedEstimate, ...] = () if e.departure is None else e.departure.remainders
-    carriers = _carriers(e)
-    known = [c for c in carriers if c is not None]
     # What was fitted beside the model would pass for what is open of sensors and surfaces.
     beside = e.departure is not None and bool(e.departure.beside)
-    fitted = e.at_trim(e.estimate) if beside else list(e.maneuvers)
-    if len(known) == len(carriers):
-        moved = systematic_error_shifts(statistical, fitted, e.cuts, known, e.trim)
-        # Of servos that were estimated the covariance has what they leave open, and the IMU's
-        # delay with it: all outputs later are all inputs earlier.
-        estimated = {SERVO_DELAY, IMU_DELAY} if e.servo is not None else set()
-        estimated |= DELAYED_COLUMNS.keys() if e.delays else set()
-        shifts += tuple(s for s in moved if s.error not in estimated)
-    if airframe is None:
-        first = e.used[0].flight
-        usual = first.errors or usual_errors(first.maker)
-        share = airspeed_share(usual, e.condition.qbar_pa)
-        shifts += airspeed_shift(statistical, fitted, e.trim, share)
+    fitted = e.at_trim(e.estimate) if beside else list(e.found.maneuvers)
+    return (
+        *(() if e.departure is None else e.departure.remainders),
+        *_by_sensors(e, statistical, fitted),
+        *_by_airspeed(e, statistical, fitted),
+        *_by_motion(e, statistical, fitted),
+    )
+
+
+def _by_sensors(
+    e: LinearEstimate, statistical: FitResult, fitted: Sequence[Maneuver]
+) -> tuple[ShiftedEstimate, ...]:
+    """Return what errors do that an aircraft file or a calibration names."""
+    carriers = _carriers(e)
+    known = [c for c in carriers if c is not None]
+    if len(known) < len(carriers):
+        return ()
+    # Of servos that were estimated the covariance has what they leave open, and the IMU's delay
+    # with it: all outputs later are all inputs earlier.
+    estimated = {SERVO_DELAY, IMU_DELAY} if e.columns.servo is not None else set()
+    estimated |= DELAYED_COLUMNS.keys() if e.found.delays else set()
+    moved = systematic_error_shifts(statistical, fitted, e.columns.cuts, known, e.trim)
+    return tuple(s for s in moved if s.error not in estimated)
+
+
+def _by_airspeed(
+    e: LinearEstimate, statistical: FitResult, fitted: Sequence[Maneuver]
+) -> tuple[ShiftedEstimate, ...]:
+    """Return what an airspeed does that nobody calibrated."""
+    if e.columns.airframe is not None:
+        return ()
+    first = e.columns.used[0].flight
+    usual = first.errors or usual_errors(first.maker)
+    share = airspeed_share(usual, e.columns.chosen.condition.qbar_pa)
+    return airspeed_shift(statistical, fitted, e.trim, share)
+
+
+def _by_motion(
+    e: LinearEstimate, statistical: FitResult, fitted: Sequence[Maneuver]
+) -> tuple[ShiftedEstimate, ...]:
+    """Return what inputs do between their samples."""
+    chosen, used = e.columns.chosen, e.columns.used
+    held = chosen.own or e.found.model.hold == "zoh"
     # Delays that were estimated have taken up half a sample, and their intervals count it.
-    held = e.model.hold == "zoh"
-    if not own and not held and (surfaces_known(e.used) or e.delays):
-        shifts += motion_shift(statistical, fitted, e.used, e.trim)
-    else:
-        shifts += hold_shift(statistical, fitted, e.trim)
-    return shifts
+    if not held and (surfaces_known(used) or e.found.delays):
+        return motion_shift(statistical, fitted, used, e.trim)
+    return hold_shift(statistical, fitted, e.trim)

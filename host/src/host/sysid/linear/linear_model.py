@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from host.aircraft.mass_properties import Condition
 from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, deviations, unknown_sensors
 from host.physical.recording import OWN
+from host.sysid.aerodynamics.coefficient_table import trim_of
 from host.sysid.checks.hidden_angles import without_vanes
+from host.sysid.estimators.gust_model import VANES
 from host.sysid.estimators.method_registry import find_method
 from host.sysid.estimators.start_values import regression_estimates
 from host.sysid.flight.filter_step import (
@@ -18,7 +21,9 @@ from host.sysid.flight.filter_step import (
     no_filter_step,
     rolling_gust_identifiable,
 )
-from host.sysid.flight.reconstructed_flight import FlownManeuver
+from host.sysid.flight.fitted_maneuvers import columns_of, fitted_and_held_out
+from host.sysid.flight.reconstructed_flight import FlownManeuver, ReconstructedFlight
+from host.sysid.maneuvers.maneuver_selection import excited_axes
 from host.sysid.models.rate_forces import with_rate_forces
 from host.sysid.models.residual_delays import (
     OTHERS_DELAYS,
@@ -64,61 +69,136 @@ STAGED = {
 }
 
 
-def model_and_method(
-    used: Sequence[FlownManeuver],
-    trim: Trim,
+@dataclass(frozen=True)
+class ChosenModel:
+    """Which model is fitted to which maneuvers, and how.
+
+    Attributes
+    ----------
+    template : str
+        What the model is called in messages.
+    model : LinearModel
+    method : str
+        The one that the default comes to.
+    asked : str
+        As asked for.
+    own : bool
+        The model is one of the user's own.
+    trim, condition
+        Means over the maneuvers of the fit.
+    used, held_out : tuple of FlownManeuver
+        In the fit, and kept for validation.
+    remarks : tuple of str
+        What is said of the choice.
+    """
+
+    template: str
+    model: LinearModel
+    method: str
+    asked: str
+    own: bool
+    trim: Trim
+    condition: Condition
+    used: tuple[FlownManeuver, ...]
+    held_out: tuple[FlownManeuver, ...]
+    remarks: tuple[str, ...]
+
+    @property
+    def gust_is_state(self) -> bool:
+        """Whether the gust is a state of the fit of a template."""
+        vanes = set(self.model.states) & set(VANES)
+        return self.method == GUST and not self.own and self.trim.known and bool(vanes)
+
+
+def choose_model(
+    flights: Sequence[ReconstructedFlight],
     template_name: str,
     method: str,
     own: LinearModel | None,
+    *,
+    named: bool,
+) -> ChosenModel:
+    """Return the model to fit, the method that the default one comes to, and the maneuvers.
+
+    Parameters
+    ----------
+    flights : sequence of ReconstructedFlight
+    template_name : str
+    method : str
+        As asked for.
+    own : LinearModel or None
+        The user's own, in place of the template.
+    named : bool
+        The user asked for this model: a stretch given is a maneuver of it, whatever moved more.
+
+    Raises
+    ------
+    IdentificationError
+        If there is no maneuver of the model, or the method needs an airspeed that is not known.
+    """
+    axes = AXIS_OF[template_name] if own is None else excited_axes(own.inputs)
+    used, held = fitted_and_held_out(flights, axes, template_name, named=named or own is not None)
+    trim, condition = trim_of(columns_of(used))
+    if own is None:
+        model, by, remarks = template_and_method(used, trim, template_name, method)
+    else:
+        model, by, remarks = own, method, ()
+        if not _delays_free(used, method):
+            model = without_standard_delays(own)
+    called = template_name if own is None else model.name
+    return ChosenModel(
+        called, model, by, method, own is not None, trim, condition, tuple(used), tuple(held),
+        remarks,
+    )  # fmt: skip
+
+
+def template_and_method(
+    used: Sequence[FlownManeuver], trim: Trim, name: str, method: str
 ) -> tuple[LinearModel, str, tuple[str, ...]]:
-    """Return the model to fit, the method that the default one comes to, and remarks.
+    """Return a template at the trim, the method that the default one comes to, and remarks.
 
     Parameters
     ----------
     used : sequence of FlownManeuver
         Those of the fit.
     trim : Trim
-    template_name : str
+    name : str
+        The template.
     method : str
         As asked for.
-    own : LinearModel or None
-        The user's own, in place of the template.
 
     Raises
     ------
     IdentificationError
         If the method needs an airspeed that is not known.
     """
-    if method == GUST and own is None and not trim.known:
+    if method == GUST and not trim.known:
         raise IdentificationError(
             f"{GUST} needs airspeed_mps, which tells how fast gusts pass; give another method"
         )
-    flight = used[0].flight
-    free = frees_places(method)
-    able = free and all(m.flight.delays_open for m in used)
-    remarks: tuple[str, ...] = ()
-    if own is None:
-        shared = set.intersection(*(set(m.flight.corrected) for m in used))
-        doubted = shared & DOUBTFUL if _in_doubt(used) else set()
-        model, remarks = fitted_template(
-            shared - doubted, template_name, used, trim, method, able=able
-        )
-        if doubted and "beta_rad" in model.states:
-            remarks = (*remarks, SIDE_FORCE_DOUBTED)
-    else:
-        model = own if able else without_standard_delays(own)
-    instrument = None if flight.compatibility is None else flight.compatibility.instrument
-    if own is None and instrument is not None and free:
-        model = with_drag_arm(model, trim, instrument)
-    if method == GUST and own is None:
+    shared = set.intersection(*(set(m.flight.corrected) for m in used))
+    doubted = shared & DOUBTFUL if _in_doubt(used) else set()
+    able = _delays_free(used, method)
+    model, remarks = fitted_template(shared - doubted, name, used, trim, method, able=able)
+    if doubted and "beta_rad" in model.states:
+        remarks = (*remarks, SIDE_FORCE_DOUBTED)
+    known = used[0].flight.compatibility
+    if known is not None and known.instrument is not None and frees_places(method):
+        model = with_drag_arm(model, trim, known.instrument)
+    if method == GUST:
         why = no_filter_step(used, model)
-        remarks += (f"{why}: L_p and L_da may come out small",) if why else ()
-    if method == DEFAULT_METHOD and own is None:
-        method, why = _default_method(model, used, trim)
-        remarks += (why,) if why else ()
-        if method != GUST and template_name == "lateral":
-            model = without_attitude(model, used)
-    return model, method, remarks
+        remarks = (*remarks, f"{why}: L_p and L_da may come out small") if why else remarks
+    if method != DEFAULT_METHOD:
+        return model, method, remarks
+    by, why = _default_method(model, used, trim)
+    if by != GUST and name == "lateral":
+        model = without_attitude(model, used)
+    return model, by, (*remarks, why) if why else remarks
+
+
+def _delays_free(used: Sequence[FlownManeuver], method: str) -> bool:
+    """Return whether delays and places of the sensors are for the fit to estimate."""
+    return frees_places(method) and all(m.flight.delays_open for m in used)
 
 
 def _in_doubt(used: Sequence[FlownManeuver]) -> bool:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from host.aircraft.mass_properties import Condition
 from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import CoefficientParts, ShiftedEstimate
 from host.sysid.aerodynamics.thrust_terms import THRUST_BESIDE
 from host.sysid.errors.trim_departure import Departure
-from host.sysid.estimators.servo_parameters import ServoEstimate
-from host.sysid.flight.reconstructed_flight import FlownManeuver
+from host.sysid.flight.column_change import Record
+from host.sysid.linear.prepared_columns import PreparedColumns
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
@@ -23,54 +21,75 @@ from host.sysid.validation.prediction_limits import Prediction
 
 
 @dataclass(frozen=True)
-class LinearEstimate:
-    """What estimation made: a model, its fit, and the data both rest on.
+class LinearFit:
+    """A fit of a chosen model, and what was taken out of its columns for it.
 
     Attributes
     ----------
-    template, method : str
+    result : FitResult
+        As the method returned it; its model has the parameters of turning air.
     model : LinearModel
         As fitted.
-    trim, condition
-        Means over the maneuvers of the fit.
-    used, held_out : tuple of FlownManeuver
-        In the fit, and kept for validation.
+    method : str
     maneuvers : tuple of Maneuver
-        Those used, as fitted.
-    cuts : tuple of mapping
-        All corrected columns of each.
-    fit : FitResult
-        As the method returned it.
-    departure : Departure or None
-        By how much airspeed and attitude that varied move the estimate.
-    delays : dict
-        Estimated before the fit: value and 95 % half-width, s.
+        As measured, delays taken out.
     fitted : tuple of Array
-        What the fit says of the outputs as measured.
-    servo : ServoEstimate or None
-        Of the inputs that are commands.
+        What the fit says of their outputs.
+    delays : dict
+        What was taken out: value and 95 % half-width, s.
+    at_trim : tuple of Maneuver or None
+        What the result was fitted to, where departures had been removed from it.
+    departure : Departure or None
+        What was fitted beside a template.
     left_out : tuple of str
-        Columns that act beside a reduced template, and that the fit does not account for.
+        Columns of which that fit says what no aircraft has.
     remarks : tuple of str
-        What is said of how model and columns were made.
+        Why this method.
     """
 
-    template: str
-    method: str
+    result: FitResult
     model: LinearModel
-    trim: Trim
-    condition: Condition
-    used: tuple[FlownManeuver, ...]
-    held_out: tuple[FlownManeuver, ...]
+    method: str
     maneuvers: tuple[Maneuver, ...]
-    cuts: tuple[Mapping[str, Array], ...]
-    fit: FitResult
-    departure: Departure | None
-    delays: dict[str, tuple[float, float]]
     fitted: tuple[Array, ...]
-    servo: ServoEstimate | None = None
+    delays: dict[str, tuple[float, float]] = field(default_factory=dict)
+    at_trim: tuple[Maneuver, ...] | None = None
+    departure: Departure | None = None
     left_out: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class LinearEstimate:
+    """What estimation made: a fit on prepared columns, and what departed from the trim.
+
+    Attributes
+    ----------
+    columns : PreparedColumns
+    found : LinearFit
+    departure : Departure or None
+        By how much airspeed and attitude that varied move the estimate.
+    record : tuple of ColumnChange
+        What was done to which columns, from the flight to the fit.
+    left_out : tuple of str
+        Columns that act beside a reduced template, and that the fit does not account for.
+    """
+
+    columns: PreparedColumns
+    found: LinearFit
+    departure: Departure | None
+    record: Record
+    left_out: tuple[str, ...]
+
+    @property
+    def fit(self) -> FitResult:
+        """As the method returned it."""
+        return self.found.result
+
+    @property
+    def trim(self) -> Trim:
+        """Mean motion over the maneuvers of the fit."""
+        return self.columns.chosen.trim
 
     @property
     def estimate(self) -> Array:
@@ -87,13 +106,20 @@ class LinearEstimate:
     def warnings(self) -> tuple[str, ...]:
         """What is said of preparation and fit."""
         thrust = self.departure is not None and self.departure.varying.thrust
-        return (*self.remarks, *self.fit.warnings, *((THRUST_BESIDE,) if thrust else ()))
+        prepared = (change.remark for change in self.record if change.remark)
+        return (
+            *self.columns.chosen.remarks,
+            *prepared,
+            *self.found.remarks,
+            *self.fit.warnings,
+            *((THRUST_BESIDE,) if thrust else ()),
+        )
 
     def at_trim(self, estimate: Array) -> list[Maneuver]:
         """Return the maneuvers as if airspeed and attitude had not varied."""
         if self.departure is None:
-            return list(self.maneuvers)
-        return self.departure.removed_from(self.maneuvers, estimate)
+            return list(self.found.maneuvers)
+        return self.departure.removed_from(self.found.maneuvers, estimate)
 
 
 @dataclass(frozen=True)

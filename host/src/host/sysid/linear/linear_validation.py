@@ -28,42 +28,41 @@ def linear_validation(
     own : LinearModel or None
         The user's own, whose delays stand in it.
     """
-    e, result = estimate, intervals.statistical
+    e, result, total = estimate, intervals.statistical, intervals.total
+    model, maneuvers, noise = e.found.model, e.found.maneuvers, intervals.coherence
     # Of frequencies the residuals are not those of samples.
     ours = result.residual_kind == "output" and all(
-        y.shape == m.outputs.shape for y, m in zip(result.fitted, e.maneuvers, strict=True)
+        y.shape == m.outputs.shape for y, m in zip(result.fitted, maneuvers, strict=True)
     )
     same = ours and not intervals.shifts
-    frozen = frozen_model(e.model, result)
+    frozen = frozen_model(model, result)
     simulated = (
-        list(result.fitted) if same else _simulated(frozen, e.maneuvers, e.at_trim(result.estimate))
+        list(result.fitted) if same else _simulated(frozen, maneuvers, e.at_trim(result.estimate))
     )
-    late = delays_of(e.model.outputs) if own is None else own.delays
-    held_out = [_without_delays(m.cut(e.model), e.model, late, e.delays) for m in e.held_out]
+    late = delays_of(model.outputs) if own is None else own.delays
+    kept = e.columns.held_out
+    held_out = [_without_delays(m.cut(model), model, late, e.found.delays) for m in kept]
     at_trim = (
         held_out
         if e.departure is None
         else e.departure.removed_from_held_out(
-            held_out, [m.departing() for m in e.held_out], result.estimate
+            held_out, [m.departing() for m in kept], result.estimate
         )
     )
-    held_out_runs = _simulated(frozen, held_out, at_trim)
-    fits = fits_of(e.model, e.maneuvers, simulated)
-    held_out_fits = fits_of(e.model, held_out, held_out_runs)
-    noise, airspeed_mps = intervals.coherence, e.trim.airspeed_mps
+    runs = _simulated(frozen, held_out, at_trim)
+    fits, held_out_fits = fits_of(model, maneuvers, simulated), fits_of(model, held_out, runs)
+    airspeed_mps = e.trim.airspeed_mps
     explained: dict[str, Prediction] = {}
     # Drawing gusts took 8 % of the five-minute default: only where an output is missed by half.
     if driven_states(result) and missed(fits):
-        explained = predictions(
-            e.model, result, intervals.total, noise, e.maneuvers, simulated, airspeed_mps
-        )
+        explained = predictions(model, result, total, noise, maneuvers, simulated, airspeed_mps)
     asked_mps = airspeed_mps if missed(held_out_fits) else None
     return LinearValidation(
         tuple(simulated),
         fits,
         held_out_fits,
-        predictions(e.model, result, intervals.total, noise, held_out, held_out_runs, asked_mps),
-        tuple(zip(held_out, held_out_runs, strict=True)),
+        predictions(model, result, total, noise, held_out, runs, asked_mps),
+        tuple(zip(held_out, runs, strict=True)),
         explained,
     )
 

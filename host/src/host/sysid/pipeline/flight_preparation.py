@@ -2,28 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from host.arrays import Array
 from host.errors import IdentificationError
-from host.instrument.deviations import unknown_sensors
+from host.instrument.deviations import SensorErrorModel, unknown_sensors
 from host.instrument.error_labels import recording_notes
 from host.instrument.servo_prior import servo_prior
 from host.physical.calibration import load_calibration
+from host.sysid.aerodynamics.thrust_terms import with_thrust
 from host.sysid.checks.agreement_findings import calibration_findings, disagreement
 from host.sysid.checks.airspeed_scale import airspeed_scale_findings
 from host.sysid.checks.data_finding import Finding
 from host.sysid.checks.feedback_findings import feedback_findings
 from host.sysid.checks.hidden_angles import no_instrument_errors_finding, no_vanes_finding
 from host.sysid.checks.small_inputs import whole_flight
+from host.sysid.flight.column_change import change_of
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight, reconstruct_flight
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.maneuvers.maneuver_selection import overlap_notes, select_maneuvers
 from host.sysid.pipeline.flight_at_hand import FlightAtHand
+from host.sysid.pipeline.known_aircraft import AircraftData
 from host.sysid.pipeline.surface_travel import with_surface_angles
-from host.sysid.reconstruction.flow_angles import reconstruct_flow_angles
+from host.sysid.reconstruction.flow_angles import FlowAngles, reconstruct_flow_angles
 from host.sysid.reconstruction.ground_attitude import update_by_standstill
 from host.sysid.reconstruction.reconstruction import (
     Compatibility,
@@ -50,6 +54,17 @@ class PreparedFlight:
         return self.flight.findings
 
 
+@dataclass(frozen=True, slots=True)
+class _Agreement:
+    """What the sensors of a flight say of each other, or what their calibration leaves open."""
+
+    found: Compatibility | None = None
+    by_calibration: Compatibility | None = None
+    findings: tuple[Finding, ...] = ()
+    notes: tuple[str, ...] = ()
+    unchecked: tuple[str, ...] = ()
+
+
 def prepare(given: FlightAtHand) -> PreparedFlight:
     """Find the maneuvers of a flight once, and reconstruct it.
 
@@ -59,78 +74,114 @@ def prepare(given: FlightAtHand) -> PreparedFlight:
         If what was asked for is not in it.
     """
     read, how, known = given.read, given.how, given.known
-    columns, travel = with_surface_angles(read.columns, read.shares, known)
-    notes, findings = [*read.notes, *travel], [*read.findings]
     instrument = known.flown(read) if known else None
-    better = load_calibration(how.calibration) if how.calibration is not None else None
-    sensors = instrument or unknown_sensors(read.recording, better)
-    if given.errors is not None:
-        sensors = replace(sensors, errors=given.errors)
-    commands = commands_of(columns, sensors)
-    columns = surface_positions(columns, sensors)
-    if instrument is not None or commands:
-        notes += recording_notes(sensors)
-    found: Sequence[DetectedManeuver]
-    if given.windows is None:
-        found = select_maneuvers(columns, stretches=how.stretches, numbers=how.maneuvers)
-    else:
-        found = given.windows
-    notes += overlap_notes(how.stretches)
-    if not found:
-        found, small = whole_flight(columns)
-        findings += small
+    sensors = _sensors(given, instrument)
+    in_rad, travel = with_surface_angles(read.columns, read.shares, known)
+    commands = commands_of(in_rad, sensors)
+    columns = surface_positions(in_rad, sensors)
+    told = recording_notes(sensors) if instrument is not None or commands else []
+    found, small = _maneuvers(given, columns)
     # A law is seen in commands: a servo moves the surface later and slower.
-    findings += feedback_findings({**columns, **commands}, found)
-    agreement = calibration_alone = None
-    unchecked: tuple[str, ...] = ()
-    try:
-        agreement = reconstruct(columns, known.airframe if known else None, instrument, sensors)
-        agreement = agreement if how.delays else without_estimated_delays(agreement)
-        if known is not None:
-            agreement, standing = update_by_standstill(agreement, columns, known.airframe)
-            notes += standing
-        findings += calibration_findings(agreement)
-    except NoAgreementError as error:
-        findings.append(disagreement(error, columns))
-        if instrument is not None and how.corrections:
-            calibration_alone = by_calibration_alone(instrument)
-    except IdentificationError as error:
-        unchecked = (str(error),)
-        findings += [no_instrument_errors_finding(columns)] if read.shares else []
-    reconstructed = agreement is not None and known is not None
-    findings += no_vanes_finding(columns, reconstructed=reconstructed)
+    fed_back = feedback_findings({**columns, **commands}, found)
+    agreed = _agreement(given, columns, instrument, sensors)
     flight = reconstruct_flight(
         columns,
         found,
         source=given.source,
         airframe=known.airframe if known else None,
         # Without sensor positions a vane ahead of the CG looks like a delayed one.
-        compatibility=agreement if known is not None and how.corrections else None,
+        compatibility=agreed.found if known is not None and how.corrections else None,
         instrument=instrument,
         resolution=read.resolution,
         maker=read.recording.maker,
     )
-    if instrument is not None:
-        findings += airspeed_scale_findings(flight.corrected, instrument)
-    angles = None
-    if agreement is not None and not agreement.vanes and known is not None:
-        try:
-            angles = reconstruct_flow_angles(flight.corrected, agreement, known.airframe)
-            notes.append(angles.line())
-        except IdentificationError as error:
-            notes.append(str(error))
-    findings = [f.accept() if f.check in how.accept and not f.accepted else f for f in findings]
+    corrected = with_thrust(flight.corrected, known.powerplant if known else None)
+    angles, line = _hidden_angles(flight.corrected, agreed.found, known)
+    reconstructed = agreed.found is not None and known is not None
+    findings = [
+        *read.findings,
+        *small,
+        *fed_back,
+        *agreed.findings,
+        *no_vanes_finding(columns, reconstructed=reconstructed),
+        *(airspeed_scale_findings(flight.corrected, instrument) if instrument else ()),
+    ]
     flight = replace(
         flight,
-        findings=tuple(findings),
+        corrected=corrected,
+        findings=tuple(f.accepted_if(how.accept) for f in findings),
         delays_open=flight.delays_open and how.delays,
         commands=commands,
         servo=servo_prior(sensors) if commands and how.delays else None,
         angles=angles,
         errors=sensors.errors,
-        calibration_alone=calibration_alone,
+        calibration_alone=agreed.by_calibration,
+        record=(
+            *change_of(read.columns, in_rad, "shares of travel made angles", "the aircraft file"),
+            *change_of(in_rad, columns, "commands brought behind usual servos", "no pot is there"),
+            *flight.record,
+            *change_of(flight.corrected, corrected, "thrust added", "measured, or of the power"),
+        ),
     )
-    return PreparedFlight(flight, agreement, tuple(notes), unchecked)
+    said = (*read.notes, *travel, *told, *overlap_notes(how.stretches), *agreed.notes, *line)
+    return PreparedFlight(flight, agreed.found, said, agreed.unchecked)
+
+
+def _sensors(given: FlightAtHand, instrument: SensorErrorModel | None) -> SensorErrorModel:
+    """Return the instrument of a flight, or what is usual of its maker's; what is known better."""
+    calibration = given.how.calibration
+    better = load_calibration(calibration) if calibration is not None else None
+    sensors = instrument or unknown_sensors(given.read.recording, better)
+    return sensors if given.errors is None else replace(sensors, errors=given.errors)
+
+
+def _maneuvers(
+    given: FlightAtHand, columns: Mapping[str, Array]
+) -> tuple[Sequence[DetectedManeuver], Sequence[Finding]]:
+    """Return the maneuvers given or found; without any the whole flight, and why."""
+    found: Sequence[DetectedManeuver]
+    if given.windows is not None:
+        found = given.windows
+    else:
+        how = given.how
+        found = select_maneuvers(columns, stretches=how.stretches, numbers=how.maneuvers)
+    return (found, ()) if found else whole_flight(columns)
+
+
+def _agreement(
+    given: FlightAtHand,
+    columns: Mapping[str, Array],
+    instrument: SensorErrorModel | None,
+    sensors: SensorErrorModel,
+) -> _Agreement:
+    """Hold the sensors of a flight against each other."""
+    known, how = given.known, given.how
+    notes: tuple[str, ...] = ()
+    try:
+        found = reconstruct(columns, known.airframe if known else None, instrument, sensors)
+    except NoAgreementError as error:
+        alone = by_calibration_alone(instrument) if instrument and how.corrections else None
+        return _Agreement(None, alone, (disagreement(error, columns),))
+    except IdentificationError as error:
+        unknown = (no_instrument_errors_finding(columns),) if given.read.shares else ()
+        return _Agreement(findings=unknown, unchecked=(str(error),))
+    found = found if how.delays else without_estimated_delays(found)
+    if known is not None:
+        found, notes = update_by_standstill(found, columns, known.airframe)
+    return _Agreement(found, None, tuple(calibration_findings(found)), notes)
+
+
+def _hidden_angles(
+    corrected: Mapping[str, Array], agreement: Compatibility | None, known: AircraftData | None
+) -> tuple[FlowAngles | None, tuple[str, ...]]:
+    """Return the flow angles that no vane measured, where they can be told, and a line of them."""
+    if agreement is None or agreement.vanes or known is None:
+        return None, ()
+    try:
+        angles = reconstruct_flow_angles(corrected, agreement, known.airframe)
+    except IdentificationError as error:
+        return None, (str(error),)
+    return angles, (angles.line(),)
 
 
 def distinct_flights(flights: Sequence[ReconstructedFlight]) -> list[ReconstructedFlight]:
