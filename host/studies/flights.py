@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from host.errors import IdentificationError
 from host.sysid.answer import read_truth, true_coefficients
-from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight import read_columns
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver, detect_maneuvers
 from host.sysid.pipeline import at_hand, identify_columns
 

@@ -19,7 +19,7 @@ from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.errors import IdentificationError
 from host.readers.even_grid import even_columns
 from host.sysid.answer import true_coefficients
-from host.sysid.linear.linear_model import AXIS_OF, DEFAULT_METHOD
+from host.sysid.linear import AXIS_OF, DEFAULT_METHOD
 from host.sysid.pipeline import at_hand, identify_columns
 from host.twin.virtual import VirtualFlight, virtual_flight
 

@@ -30,7 +30,7 @@ from host.instrument.instrument_errors import (
 )
 from host.physical.recording import AUTOPILOT
 from host.sysid.answer import CAREFUL, TRUSTED
-from host.sysid.flight.reconstructed_flight import ReconstructedFlight
+from host.sysid.flight import ReconstructedFlight
 from host.sysid.pipeline import Identification, ReadingOptions, aircraft_data, prepare, read_flight
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.outcome.autopilot_logs import write_autopilot_log

@@ -36,7 +36,7 @@ from host.planning.onboard_sums import (
     AxisCard,
     FourierSums,
 )
-from host.sysid.flight.flight_tables import FlightColumns, read_flight_columns
+from host.sysid.flight import FlightColumns, read_flight_columns
 from host.twin.flight.fly import fly
 from host.twin.outcome import compare, truth_files
 from host.twin.outcome.virtual_calibration import calibration

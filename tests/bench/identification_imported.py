@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 from host.aircraft.mass_properties import airframe_data
 from host.constants import NORMAL_95
-from host.sysid.flight.flight_tables import read_flight_columns
+from host.sysid.flight import read_flight_columns
 from host.sysid.numerics.differentiation import local_polynomial
 from host.sysid.pipeline import aircraft_data
 from host.sysid.pipeline.surface_travel import with_surface_angles

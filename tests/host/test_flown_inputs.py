@@ -10,7 +10,7 @@ from host.arrays import Array
 from host.log import FlightLog
 from host.log.flown_inputs import FlownInput, flown_inputs
 from host.log.quality import judge
-from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight import read_columns
 from host.sysid.maneuvers.logged_inputs import input_columns
 from host.sysid.maneuvers.maneuver_detection import detect_maneuvers
 from host.wire.flight_card import card_bytes, parts

@@ -183,7 +183,7 @@ def use_calibration(path: Path, rng: random.Random) -> None:
 
 def use_map(path: Path, rng: random.Random) -> None:
     """As `maneuvers` does."""
-    from host.sysid.flight.flight_tables import read_columns
+    from host.sysid.flight import read_columns
 
     del rng
     columns, _ = read_columns(Path("foreign.csv"), path)

@@ -18,7 +18,7 @@ from host.instrument.instrument_errors import (
 from host.physical.calibration import load_calibration
 from host.physical.recording import Recording
 from host.resources import resource
-from host.sysid.flight.flight_tables import FlightColumns
+from host.sysid.flight import FlightColumns
 from host.sysid.pipeline import aircraft_data
 from host.sysid.reconstruction.path_preparation import prior
 from host.twin.flight.draws import DRAWN_ERRORS, draw

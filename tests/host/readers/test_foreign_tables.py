@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.errors import IdentificationError
-from host.sysid.flight.flight_tables import read_columns, read_flight_columns
+from host.sysid.flight import read_columns, read_flight_columns
 from host.sysid.maneuvers.maneuver_detection import detect_maneuvers
 from scipy import io
 

@@ -12,7 +12,7 @@ import pytest
 from host.cli import main
 from host.export.dataflash_writer import Records
 from host.readers.autopilot_flight import read_autopilot
-from host.sysid.flight.flight_tables import read_flight_columns
+from host.sysid.flight import read_flight_columns
 from host.sysid.pipeline import aircraft_data
 from host.sysid.pipeline.surface_travel import with_surface_angles
 from host.twin.outcome import ardupilot_log

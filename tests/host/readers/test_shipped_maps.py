@@ -10,7 +10,7 @@ import pytest
 from host.cli import main
 from host.errors import IdentificationError
 from host.readers.shipped_maps import shipped_maps
-from host.sysid.flight.flight_tables import read_flight_columns
+from host.sysid.flight import read_flight_columns
 from scipy import io
 
 THOR = Path(__file__).parents[2] / "data/thor75/flight75_240_270.csv"

@@ -12,7 +12,7 @@ from host.aircraft.powerplant import NoPropulsionError, powerplant
 from host.cli import main
 from host.export.toml import dumps
 from host.instrument.deviations import sensor_error_model
-from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight import read_columns
 from host.sysid.models import read_model
 
 from tests.host.logs import ROOT

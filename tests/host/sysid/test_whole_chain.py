@@ -13,7 +13,7 @@ from host.cli import main
 from host.errors import IdentificationError
 from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
-from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight import read_columns
 from host.sysid.maneuvers.maneuver_detection import detect_maneuvers, grade
 from host.sysid.models import Trim, read_model
 from host.sysid.models.templates import longitudinal

@@ -34,7 +34,7 @@ from host.planning.predicted_widths import (
 from host.sysid.coefficients import CoefficientModel, standard_model
 from host.sysid.coefficients.coefficient_estimator import coefficient_estimator
 from host.sysid.coefficients.window_spectra import ResidualSpectra
-from host.sysid.flight.reconstructed_flight import reconstruct_flight
+from host.sysid.flight import reconstruct_flight
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver, detect_maneuvers
 from host.twin.testcard.cards import Card, Segment
 

@@ -24,7 +24,7 @@ from host.readers.foreign_tables import from_frame
 from host.readers.recorded import recording_of_table
 from host.sysid.coefficients import CoefficientFit
 from host.sysid.coefficients.coefficient_intervals import CoefficientIntervals
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.linear import Answer
 from host.sysid.models.parameter_units import parameter_unit
 from host.sysid.pipeline import identify
 from host.twin.testcard.cards import Card

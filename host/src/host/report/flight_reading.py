@@ -32,7 +32,7 @@ from host.report.gps_position import (
     log_utc_s,
 )
 from host.report.shown_flight import Happening, ServoJump, ShownFlight, with_gaps
-from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight import read_columns
 from host.sysid.maneuvers.maneuver_detection import (
     DetectedManeuver,
     Grade,

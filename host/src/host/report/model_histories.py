@@ -13,7 +13,7 @@ from host.sysid.answer.figure_kinds import shown
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from host.sysid.linear.linear_answer import Answer
+    from host.sysid.linear import Answer
     from host.sysid.models import Maneuver
 
 _MEASURED, _ONE_STEP, _FREE, _INPUT = "0.6", "C0", "C3", "C2"

@@ -67,7 +67,7 @@ def known_names() -> dict[str, list[str]]:
     """Return the names that come with the package, by kind."""
     from host.aircraft.file import names as aircraft
     from host.readers.shipped_maps import shipped_maps
-    from host.sysid.linear.linear_model import AXIS_OF
+    from host.sysid.linear import AXIS_OF
     from host.sysid.models.named_models import shipped_files
     from host.sysid.pipeline.requested_models import COEFFICIENTS, known_methods
     from host.twin.testcard.cards import names as cards

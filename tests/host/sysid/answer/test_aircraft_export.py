@@ -24,7 +24,7 @@ from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTa
 from host.sysid.answer import read_truth, true_coefficients
 from host.sysid.answer.aircraft_export import AXES, CONTROLS, aircraft_document
 from host.sysid.coefficients.coefficient_fit import MeanCondition, ThrustEffect
-from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight import read_columns
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
 

@@ -19,7 +19,7 @@ from host.sysid.answer.figure_kinds import (
     shown,
     spectra,
 )
-from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight import read_columns
 
 from tests.host.sysid.at_hand import identify
 from tests.host.sysid.verdicts import verdict_of

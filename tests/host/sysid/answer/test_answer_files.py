@@ -15,8 +15,8 @@ from host.export.mat_writer import mat_name
 from host.sysid.answer import OutputPaths, check_outputs
 from host.sysid.answer.mat_file import labels, write_answers
 from host.sysid.answer.simulator_forms import write_form
-from host.sysid.flight.flight_tables import read_columns
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.flight import read_columns
+from host.sysid.linear import Answer
 from scipy import io
 
 from tests.host.sysid.at_hand import identify

@@ -12,7 +12,7 @@ from host.sysid.answer import CAREFUL, MARKS, TRUSTED, answer_document, json_tex
 from host.sysid.answer.converted_marks import converted_marks
 from host.sysid.answer.marks import SMALL, UNSURE
 from host.sysid.answer.short_answer import short_table
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.linear import Answer
 from host.sysid.pipeline.estimate_table import estimate_table
 from studies.wrong_flights import fly
 

@@ -7,9 +7,8 @@ import pytest
 from host.cli import main
 from host.sysid.answer.method_comparison import method_table
 from host.sysid.estimators import methods
-from host.sysid.flight.flight_tables import read_columns
-from host.sysid.linear.linear_answer import Answer
-from host.sysid.linear.linear_model import STAGED
+from host.sysid.flight import read_columns
+from host.sysid.linear import STAGED, Answer
 from host.sysid.maneuvers.maneuver_selection import select_maneuvers
 
 from tests.host.sysid.at_hand import identify

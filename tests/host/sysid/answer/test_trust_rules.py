@@ -9,7 +9,7 @@ from host.sysid.answer.servo_lines import servo_document
 from host.sysid.answer.trust_rules import Evidence, driven_by_inputs
 from host.sysid.checks.data_finding import Finding
 from host.sysid.estimators.servo_parameters import SERVO, ServoEstimate, ServoNumber
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.linear import Answer
 from host.sysid.models import Trim, template
 from host.sysid.validation.prediction_limits import Prediction
 from studies.wrong_flights import LinearFlight, fly

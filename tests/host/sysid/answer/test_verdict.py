@@ -9,7 +9,7 @@ from host.sysid.answer.estimate_lines import model_lines
 from host.sysid.answer.marks import share_text
 from host.sysid.answer.trust_rules import unpredicted_states
 from host.sysid.estimators import fit
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.linear import Answer
 from host.sysid.models import Trim
 from host.sysid.models.diagnostics import SignalFit, collinearity, reference_values
 from host.sysid.models.modal_analysis import modes, modes_of

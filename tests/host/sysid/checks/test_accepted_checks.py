@@ -15,7 +15,7 @@ import pytest
 from host.cli import main
 from host.readers.even_grid import USED
 from host.sysid.checks.data_finding import CHECKS
-from host.sysid.flight.flight_tables import read_flight_columns
+from host.sysid.flight import read_flight_columns
 
 from tests.host.readers.autopilot_flights import write
 

@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 from host.readers.column_sampling import quantum, sampling_of
 from host.sysid.estimators.filter_error_gust import SLOW_IN_CALM
-from host.sysid.flight.flight_tables import read_flight_columns
-from host.sysid.linear.linear_answer import Answer as LinearAnswer
+from host.sysid.flight import read_flight_columns
+from host.sysid.linear import Answer as LinearAnswer
 from host.sysid.models import Maneuver, Trim
 from host.sysid.models.templates import longitudinal
 from host.sysid.numerics.output_error_problem import OutputProblem

@@ -16,8 +16,8 @@ from host.sysid.answer.trust_rules import Evidence
 from host.sysid.checks.data_finding import Feedback, Finding
 from host.sysid.checks.feedback_findings import feedback_findings
 from host.sysid.coefficients import CoefficientAnswer
-from host.sysid.flight.flight_tables import read_flight_columns
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.flight import read_flight_columns
+from host.sysid.linear import Answer
 from host.sysid.maneuvers.maneuver_detection import detect_maneuvers
 from host.sysid.maneuvers.maneuver_selection import select_maneuvers
 from host.sysid.models import Term

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from host.instrument.instrument_errors import usual_errors
 from host.physical.recording import FOREIGN
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.linear import Answer
 from studies.foreign.flight import Air, derivatives, fly
 
 from tests.host.sysid.at_hand import identify

@@ -12,7 +12,7 @@ from host.cli import main
 from host.constants import GRAVITY_MPS2
 from host.errors import IdentificationError
 from host.people_units import people_name
-from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight import read_columns
 from host.twin.virtual import virtual_flight
 from scipy.signal import lsim
 from studies.foreign.flight import Air, derivatives, fly

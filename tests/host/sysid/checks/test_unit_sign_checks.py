@@ -11,7 +11,7 @@ from host.readers.column_map import UNITS
 from host.sysid.checks.data_finding import CHECKS, Finding, open_channels
 from host.sysid.checks.finding_consequences import checked
 from host.sysid.checks.unit_sign_checks import SURFACES, check
-from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight import read_columns
 from studies.foreign.flight import Air, fly
 
 Columns = dict[str, np.ndarray]

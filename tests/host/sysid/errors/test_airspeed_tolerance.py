@@ -8,7 +8,7 @@ from host.instrument.deviations import airspeed_share
 from host.instrument.instrument_errors import usual_errors
 from host.physical.recording import AUTOPILOT, FOREIGN, OWN
 from host.sysid.answer import TRUSTED
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.linear import Answer
 from studies.wrong_flights import TRUTH, fly
 
 from tests.host.sysid.at_hand import identify

@@ -9,7 +9,7 @@ from host.physical.calibration import load_calibration
 from host.physical.recording import FOREIGN, Recording
 from host.sysid.answer import TRUSTED
 from host.sysid.errors.systematic_errors import systematic_residuals
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.linear import Answer
 from host.sysid.models import Maneuver, Trim, template
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.reconstruction.reconstruction import by_calibration_alone

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from host.physical.recording import FOREIGN
 from host.sysid.answer import TRUSTED
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.linear import Answer
 from studies import wrong_flights
 from studies.wrong_flights import LinearFlight
 

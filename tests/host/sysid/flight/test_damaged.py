@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from host.cli import main
 from host.errors import ExitCode, HostError
-from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight import read_columns
 
 from tests.host.logs import ROOT
 

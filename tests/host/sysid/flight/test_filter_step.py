@@ -5,8 +5,7 @@ import pytest
 from host.instrument.deviations import sensor_error_model
 from host.physical.recording import AUTOPILOT, FOREIGN, OWN
 from host.readers.column_sampling import sampled_name
-from host.sysid.flight.filter_step import with_filter_step
-from host.sysid.flight.reconstructed_flight import FlownManeuver, ReconstructedFlight
+from host.sysid.flight import FlownManeuver, ReconstructedFlight, with_filter_step
 from host.sysid.linear.linear_model import template_and_method
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models import Trim, template

@@ -7,7 +7,7 @@ import pytest
 from host.aircraft.mass_properties import AirframeData
 from host.constants import GRAVITY_MPS2
 from host.sysid.aerodynamics.thrust_terms import LEAST_SHARE, THRUST_BESIDE, with_thrust
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.linear import Answer
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models import Trim
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from host.arrays import Array
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.linear import Answer
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models import Trim, template
 from scipy import signal

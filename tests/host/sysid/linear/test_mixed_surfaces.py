@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight import read_columns
 from scipy.signal import lsim
 
 from tests.host.sysid.at_hand import identify

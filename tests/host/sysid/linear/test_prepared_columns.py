@@ -4,10 +4,8 @@ from dataclasses import replace
 
 import pytest
 from host.physical.recording import FOREIGN, OWN, Recording
-from host.sysid.flight.column_change import changed_columns
-from host.sysid.flight.reconstructed_flight import FlownManeuver
-from host.sysid.linear.linear_estimator import LinearEstimator
-from host.sysid.linear.linear_stages import LinearEstimate
+from host.sysid.flight import FlownManeuver, changed_columns
+from host.sysid.linear import LinearEstimate, LinearEstimator
 from host.sysid.pipeline import at_hand
 from host.sysid.pipeline.flight_preparation import prepare
 from studies.wrong_flights import fly

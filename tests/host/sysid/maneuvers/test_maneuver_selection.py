@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from host.cli import main
 from host.errors import IdentificationError
-from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight import read_columns
 from host.sysid.maneuvers.maneuver_detection import AXES, detect_maneuvers, grade
 from host.sysid.maneuvers.maneuver_selection import (
     excited_axes,

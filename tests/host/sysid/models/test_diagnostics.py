@@ -8,7 +8,7 @@ from host.aircraft.mass_properties import Condition
 from host.sysid import Maneuver, fit
 from host.sysid.answer import answer_document
 from host.sysid.answer.estimate_lines import model_lines
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.linear import Answer
 from host.sysid.models import Parameter, Term, Trim, model_from
 from host.sysid.models.diagnostics import (
     NOT_IDENTIFIABLE,

@@ -17,7 +17,7 @@ from host.errors import HostError
 from host.sysid.answer import MARKS, OutputPaths, read_truth, true_coefficients
 from host.sysid.answer.answer_figures import draw_coefficients
 from host.sysid.coefficients import standard_model
-from host.sysid.linear.linear_estimator import LinearEstimator
+from host.sysid.linear import LinearEstimator
 from host.sysid.maneuvers import maneuver_detection, maneuver_selection
 from host.sysid.models import Trim, template
 from host.sysid.pipeline import Identification, ReadingOptions, prepare, read_flight

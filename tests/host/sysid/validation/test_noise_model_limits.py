@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from host.sysid.answer.model_agreement import RELIED_ON
 from host.sysid.estimators import fit
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.linear import Answer
 from host.sysid.models import LinearModel, Maneuver, model_from
 from host.sysid.numerics.ar_noise import ArNoise, autocovariance
 from host.sysid.numerics.input_coherence import input_coherence

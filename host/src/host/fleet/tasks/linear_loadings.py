@@ -16,7 +16,7 @@ from host.fleet.tasks.estimate_loadings import LoadedEstimates, split_covariance
 from host.instrument.error_labels import ERROR_LABELS
 from host.instrument.instrument_errors import InstrumentErrors
 from host.sysid.aerodynamics.coefficient_table import QBAR, SHARED, VANE, CoefficientParts
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.linear import Answer
 
 # As the coefficients' own fit calls them: flights of both kinds share an error by its name.
 _ASSUMED = {

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from host.aircraft.file import Aircraft
 from host.arrays import Array
-from host.sysid.flight.reconstructed_flight import ReconstructedFlight
+from host.sysid.flight import ReconstructedFlight
 
 _BLOCK_S = 1.0  # gusts and the pilot's corrections go together for about so long
 _LEAST_BLOCKS = 3

@@ -23,8 +23,7 @@ from host.sysid.coefficients.coefficient_estimator import (
     CoefficientEstimator,
     coefficient_estimator,
 )
-from host.sysid.flight.flight_tables import FlightColumns, read_flight_columns
-from host.sysid.flight.reconstructed_flight import maneuver_name, reconstruct_flight
+from host.sysid.flight import FlightColumns, maneuver_name, read_flight_columns, reconstruct_flight
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver, detect_maneuvers
 from host.sysid.pipeline import AircraftData, aircraft_data
 from host.sysid.pipeline.surface_travel import with_surface_angles
