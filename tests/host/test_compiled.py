@@ -161,3 +161,40 @@ def test_a_kernel_is_compiled_where_no_cache_can_be() -> None:
     # Code of no file is not kept, as of a file where nobody may write.
     exec("def kernel(x):\n    return 2.0 * x\n", found)
     assert compiled(found["kernel"])(3.0) == 6.0
+
+
+GENERATE = """
+import sys
+import host.compiled as compiled
+from host.sysid.expressions.equation_code import EquationCode
+
+compiled.__file__ = sys.argv[1] + "/compiled.py"  # an installation of its own
+text = "\\n".join(f"def {name}(x): return 2.0 * x" for name in
+                 ("rates", "rate_slopes", "readings", "reading_slopes"))
+def loop(x):
+    return rates(x)
+kernel = EquationCode(text).loop(loop)
+value, stats = kernel(21.0), kernel.machine().stats
+print(value, len(stats.cache_hits))
+"""
+
+
+def test_generated_code_is_compiled_once_for_every_installation_of_a_user(tmp_path: Path) -> None:
+    environment = {
+        k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "LOCALAPPDATA")
+    }
+    environment |= {"XDG_CACHE_HOME": str(tmp_path / "own")}
+    places = [tmp_path / name for name in ("one", "other", "third")]
+    for place in places:
+        place.mkdir()
+    start = [sys.executable, "-c", GENERATE]
+    both = [
+        subprocess.Popen([*start, str(place)], env=environment, stdout=subprocess.PIPE, text=True)
+        for place in places[:2]
+    ]
+    assert {one.communicate()[0].split()[0] for one in both} == {"42.0"}  # at the same time
+    last = subprocess.run(
+        [*start, str(places[2])], env=environment, capture_output=True, text=True, check=True
+    )
+    assert last.stdout.split() == ["42.0", "1"]
+    assert not last.stderr

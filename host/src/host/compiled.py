@@ -8,6 +8,7 @@ so, for the code is kept beside its source.
 from __future__ import annotations
 
 import contextlib
+import dis
 import functools
 import hashlib
 import importlib.util
@@ -26,9 +27,12 @@ from host.resources import user_cache
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
-LOADING_S, S_PER_BYTE = 0.7, 0.0006  # numba's own start, and a kernel by the size of its byte code
+# numba's own start, an instruction, a loop: seven kernels of equations, tests/bench/README.md
+LOADING_S, INSTRUCTION_S, LOOP_S = 0.5, 0.0007, 0.2
+A_WAIT_S = 4.0  # what is said of a later kernel too
 SLOWER = "100 to 400"  # times: the card `calm` in flight 103, the printed Hopfield iteration 410
 KEPT = "kernels"  # folder in the `__pycache__` of the source
+GENERATED = ".text"  # how the name of a generated module ends
 MOST_KEPT = 30  # generated modules of a kind: models that a user tries, about 1 MB each
 
 
@@ -104,9 +108,7 @@ class Kernel(Generic[Arguments, Result]):
             self._kept = _folder(self)
             fresh = self._kept is None or not any(self._kept.rglob("*.nbc"))
             if said and fresh:
-                left = [k.function.__code__ for k in _all_of(self) if k._machine is None]
-                size = sum(len(code.co_code) for code in left)
-                _say_compiling(f"{self.name}, about {LOADING_S + S_PER_BYTE * size:.0f} s")
+                _say_compiling(self.name, compiling_s(self))
             self._machine = _jit(self._linked(), self._reordered, self._kept)
         return self._machine
 
@@ -159,11 +161,18 @@ def has_compiler() -> bool:
     return importlib.util.find_spec("numba") is not None
 
 
+def compiling_s(kernel: Kernel[..., Any]) -> float:
+    """Return about how long numba takes over a kernel and what it calls, s: half to twice that."""
+    left = [k.function.__code__ for k in _all_of(kernel) if k._machine is None]
+    names = [one.opname for code in left for one in dis.get_instructions(code)]
+    return LOADING_S + INSTRUCTION_S * len(names) + LOOP_S * names.count("FOR_ITER")
+
+
 def generated_source(text: str, kind: str) -> Path:
     """Keep a generated module as a file, because numba keeps code of files alone.
 
-    Its name holds a digest of its text: what was generated before is compiled already. The
-    `MOST_KEPT` used last stay.
+    Its name holds a digest of its text: what any installation of this user generated before is
+    compiled already. The `MOST_KEPT` used last stay.
 
     Parameters
     ----------
@@ -177,8 +186,9 @@ def generated_source(text: str, kind: str) -> Path:
         Of a file, or of none where nobody may write: it is then compiled in every process.
     """
     stem = f"{kind}_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
-    for place in _places(Path(__file__)):
-        path = place / f"{stem}.text"
+    beside = Path(__file__).parent / "__pycache__" / KEPT
+    for place in sorted(_places(Path(__file__)), key=lambda one: one == beside):
+        path = place / f"{stem}{GENERATED}"
         with contextlib.suppress(OSError):
             place.mkdir(parents=True, exist_ok=True)
             if not path.is_file():
@@ -189,12 +199,12 @@ def generated_source(text: str, kind: str) -> Path:
             os.utime(path, ns=(time.time_ns(), path.stat().st_mtime_ns))
             _forget_oldest(place, kind)
             return path
-    return Path(f"{stem}.text")
+    return Path(f"{stem}{GENERATED}")
 
 
 def _forget_oldest(place: Path, kind: str) -> None:
     """Remove generated modules that were used longest ago, and their compiled code."""
-    kept = sorted(place.glob(f"{kind}_*.text"), key=lambda path: path.stat().st_atime)
+    kept = sorted(place.glob(f"{kind}_*{GENERATED}"), key=lambda path: path.stat().st_atime)
     for path in kept[:-MOST_KEPT]:
         path.unlink(missing_ok=True)
         for code in (path.parent / "__pycache__" / KEPT).glob(f"{path.stem}.*"):
@@ -256,7 +266,8 @@ def _folder(kernel: Kernel[..., Any]) -> Path | None:
             if not os.access(place, os.W_OK):
                 continue
             for old in place.glob(f"{name}.*"):
-                if old.name != f"{name}.{digest}":
+                # Code of a generated module may be another installation's: it goes with its module.
+                if old.name != f"{name}.{digest}" and source.suffix != GENERATED:
                     shutil.rmtree(old, ignore_errors=True)
             return place / f"{name}.{digest}"
     return None
@@ -327,13 +338,16 @@ def _say_slow() -> None:
     _say(f"without numba this takes {SLOWER} times as long: {install_hint('numba')}")
 
 
-def _say_compiling(what: str) -> None:
-    """Announce compilation once in a process; later kernels are stages of the work."""
+def _say_compiling(name: str, takes_s: float) -> None:
+    """Announce the first compilation of a process, and each later one that is a wait."""
     global _announced
+    what = f"{name}, about {takes_s:.0f} s"
     stage(f"compiling {what}")
     if not _announced:
         _announced = True
         _say(f"a first run compiles its kernels and keeps them for the next ({what}, comes first)")
+    elif takes_s >= A_WAIT_S:
+        _say(f"compiling {what}")
 
 
 def _say(text: str) -> None:
