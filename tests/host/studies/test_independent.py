@@ -7,7 +7,7 @@ import pytest
 from host.aircraft.mass_properties import airframe_data
 from host.instrument.deviations import sensor_error_model
 from host.physical.calibration import load_calibration
-from host.sysid.answer.trust_rules import Evidence, doubts_of
+from host.sysid.answer import judge
 from host.sysid.reconstruction.path_preparation import density_share
 from studies import independent
 from studies.foreign.aeroplane import DENSITY_KGPM3, TRAINER, motion
@@ -109,7 +109,8 @@ def test_in_calm_air_the_unseen_maneuver_is_predicted_and_the_answer_trusted() -
         answer.maneuvers, answer.result.fitted, answer.result.residuals, strict=True
     ):
         np.testing.assert_allclose(m.outputs - y, e, atol=1e-9)
-    doubted = {name for one in doubts_of(answer, Evidence()) for name in one.names}
+    [verdict] = judge([answer])
+    doubted = {name for name, (_, *against) in verdict.reasons.items() if against}
     assert not doubted & set(independent.NAMES["longitudinal"])
 
 

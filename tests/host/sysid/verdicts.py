@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from host.sysid.answer import Verdict, judge
-from host.sysid.answer.trust_rules import Evidence
+from host.sysid.answer.doubt import Evidence
 from host.sysid.coefficients import CoefficientAnswer
 from host.sysid.linear import Answer
 

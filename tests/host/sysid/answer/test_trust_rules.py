@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.sysid.answer import CAREFUL, TRUSTED, answer_document
+from host.sysid.answer.doubt import Evidence
+from host.sysid.answer.linear_rules import driven_by_inputs
 from host.sysid.answer.servo_lines import servo_document
-from host.sysid.answer.trust_rules import Evidence, driven_by_inputs
 from host.sysid.checks.data_finding import Finding
 from host.sysid.estimators.servo_parameters import SERVO, ServoEstimate, ServoNumber
 from host.sysid.linear import Answer

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import Condition
 from host.sysid.answer.estimate_lines import model_lines
+from host.sysid.answer.linear_rules import unpredicted_states
 from host.sysid.answer.marks import share_text
-from host.sysid.answer.trust_rules import unpredicted_states
 from host.sysid.estimators import fit
 from host.sysid.linear import Answer
 from host.sysid.models import Trim

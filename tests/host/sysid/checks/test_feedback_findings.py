@@ -10,9 +10,10 @@ import pandas as pd
 import pytest
 from host.cli import main
 from host.sysid.answer import CAREFUL, TRUSTED
-from host.sysid.answer.coefficient_rules import input_feedback
+from host.sysid.answer.coefficient_view import CoefficientView
+from host.sysid.answer.doubt import Evidence
 from host.sysid.answer.feedback_pairs import alike_derivatives, combined_derivatives
-from host.sysid.answer.trust_rules import Evidence
+from host.sysid.answer.trust_rules import input_feedback
 from host.sysid.checks.data_finding import Feedback, Finding
 from host.sysid.checks.feedback_findings import feedback_findings
 from host.sysid.coefficients import CoefficientAnswer
@@ -311,5 +312,7 @@ def test_coefficients_of_the_pair_are_doubted_in_equations_that_have_both() -> N
     names = ["CY_beta", "CY_dr", "Cl_p", "Cl_r", "Cl_dr", "Cn_beta", "Cn_r", "Cn_dr", "Cn_da"]
     fitted = SimpleNamespace(derivatives=[SimpleNamespace(name=n) for n in names])
     law = Feedback("rudder_rad", ("r_radps",), (0.4,))
-    [doubt] = input_feedback(cast(CoefficientAnswer, SimpleNamespace(fit=fitted)), law)
+    view = CoefficientView(cast(CoefficientAnswer, SimpleNamespace(fit=fitted)))
+    found = Finding("feedback", (), "", feedback=law)
+    [doubt] = input_feedback(view, Evidence(findings=(found,)))
     assert doubt.names == ("Cl_r", "Cl_dr", "Cn_r", "Cn_dr")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from host.sysid.answer.coefficient_rules import lag_beside
+from host.sysid.answer.coefficient_view import lag_beside
 from host.sysid.coefficients import CoefficientAnswer
 from studies.foreign.aeroplane import TRAINER
 from studies.foreign.flight import fly
@@ -39,7 +39,7 @@ def test_surfaces_that_lag_behind_their_columns_leave_no_moment_relied_on(
 ) -> None:
     # Cm_alpha 42, Cm_de 52, Cl_p 55 % off, known to 4, stood under "trust".
     answer = coefficients(measured, LAG_S)
-    doubted = {name for one in lag_beside(answer, {}) for name in one.names}
+    doubted = {name for one in lag_beside(answer) for name in one.names}
     off = {
         d.name
         for d in answer.fit.derivatives
@@ -54,4 +54,4 @@ def test_surfaces_that_are_no_later_than_their_columns_say_nothing(
     measured: Columns, lag_s: float
 ) -> None:
     """The demonstration's aileron seems 5 ms early, known to 1.7: all of its Cl was doubted."""
-    assert lag_beside(coefficients(measured, lag_s), {}) == []
+    assert lag_beside(coefficients(measured, lag_s)) == []

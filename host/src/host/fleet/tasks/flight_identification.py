@@ -25,10 +25,8 @@ from host.fleet.tasks.linear_loadings import linear_loadings
 from host.fleet.tasks.surface_response import surface_quantities
 from host.fleet.tasks.vane_zeros import vane_zeros
 from host.instrument.error_sources import AIRCRAFT_FILE, TYPE
-from host.sysid.answer import trust_rules
-from host.sysid.answer.coefficient_rules import input_feedback, open_finding
-from host.sysid.answer.feedback_pairs import feedback_of
-from host.sysid.checks.data_finding import finding_document, open_channels
+from host.sysid.answer import doubted_by_findings
+from host.sysid.checks.data_finding import finding_document
 from host.sysid.coefficients import CoefficientFit
 from host.sysid.pipeline import Identification, identify
 from host.sysid.reconstruction.sensor_dynamics import SERVO_DELAY
@@ -128,15 +126,9 @@ def _answer_columns(found: Identification) -> dict[str, Any]:
 
 def _doubted(found: Identification) -> list[str]:
     """Return the coefficients that a finding about the data speaks against."""
+    names = doubted_by_findings(found.linear, found.coefficients, found.findings)
     if found.coefficients:
-        answer, laws = found.coefficients, feedback_of(found.findings)
-        doubts = open_finding(answer, open_channels(found.findings))
-        doubts += [one for law in laws for one in input_feedback(answer, law)]
-        return sorted({name for doubt in doubts for name in doubt.names})
-    rules = (trust_rules.open_finding, trust_rules.input_feedback)
-    evidence = trust_rules.Evidence(found.linear, found.findings)
-    doubts = [one for a in found.linear for rule in rules for one in rule(a, evidence)]
-    names = {name for doubt in doubts for name in doubt.names}
+        return sorted(names)
     linear_names = {c.name for answer in found.linear for c in answer.coefficients}
     return sorted(name for name in linear_names if dimensional_name(name) in names)
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from host.sysid.answer.marks import CAREFUL, MARKS, TRUSTED, Verdict
     from host.sysid.answer.output_files import OutputPaths, check_outputs
     from host.sysid.answer.truth_comparison import read_truth, true_coefficients
-    from host.sysid.answer.verdict import judge
+    from host.sysid.answer.verdict import doubted_by_findings, judge
 
 __all__ = [
     "CAREFUL",
@@ -21,6 +21,7 @@ __all__ = [
     "Verdict",
     "answer_document",
     "check_outputs",
+    "doubted_by_findings",
     "json_text",
     "judge",
     "read_truth",
@@ -37,6 +38,7 @@ __getattr__ = lazily(
         "Verdict": "marks",
         "answer_document": "json_document",
         "check_outputs": "output_files",
+        "doubted_by_findings": "verdict",
         "json_text": "json_document",
         "judge": "verdict",
         "read_truth": "truth_comparison",

@@ -7,15 +7,7 @@ from collections.abc import Mapping
 
 from host.aircraft.gains import dimensional_name
 from host.sysid.aerodynamics.coefficient_table import Coefficient
-from host.sysid.answer.marks import (
-    CAREFUL,
-    FAIR,
-    MARKS,
-    SMALL,
-    TRUST,
-    TRUSTED,
-    UNSURE,
-)
+from host.sysid.answer.marks import MARKS, SMALL, Judged, mark_of
 from host.sysid.linear.linear_answer import Answer
 
 
@@ -40,7 +32,4 @@ def converted_marks(answer: Answer, marks: Mapping[str, str]) -> dict[str, str]:
 
 
 def _by_width(c: Coefficient) -> str:
-    share = c.half_width / max(abs(c.value), 1e-300)
-    if share <= TRUST:
-        return TRUSTED
-    return CAREFUL if share <= FAIR else UNSURE
+    return mark_of(Judged(c.name, c.half_width / max(abs(c.value), 1e-300)))

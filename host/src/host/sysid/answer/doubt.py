@@ -1,9 +1,12 @@
-"""A reason against relying on parameters, whatever their interval says."""
+"""A reason against relying on parameters, whatever their interval says, and where it comes from."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+
+from host.sysid.checks.data_finding import Finding
+from host.sysid.linear.linear_answer import Answer
 
 
 @dataclass(frozen=True, slots=True)
@@ -12,6 +15,22 @@ class Doubt:
 
     names: tuple[str, ...]
     reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """What beside an answer speaks against it.
+
+    Attributes
+    ----------
+    beside : tuple of Answer
+        All linear answers of the same data, this one among them.
+    findings : tuple of Finding
+        Of the data checks.
+    """
+
+    beside: tuple[Answer, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
 
 def doubt(names: Iterable[str], order: Iterable[str], reason: str) -> list[Doubt]:

@@ -10,9 +10,9 @@ import numpy as np
 
 from host.constants import DEG_PER_RAD
 from host.sysid.answer.constant_lines import constant_lines
+from host.sysid.answer.linear_rules import unpredicted_states
 from host.sysid.answer.servo_lines import servo_estimate_lines
 from host.sysid.answer.settling_history import history_lines
-from host.sysid.answer.trust_rules import unpredicted_states
 from host.sysid.linear.linear_answer import Answer
 from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.parameter_units import parameter_unit

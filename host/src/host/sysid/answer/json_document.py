@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from host.sysid.answer.converted_marks import converted_marks
+from host.sysid.answer.linear_rules import unpredicted_states
 from host.sysid.answer.marks import Verdict
 from host.sysid.answer.servo_lines import servo_document
 from host.sysid.answer.settling_history import settling_document
-from host.sysid.answer.trust_rules import unpredicted_states
 from host.sysid.coefficients.coefficient_fit import METHOD
 from host.sysid.flight.reconstructed_flight import maneuver_name
 from host.sysid.linear.linear_answer import Answer

@@ -1,8 +1,8 @@
-"""What a parameter may be used for, in five marks, and the words that head them."""
+"""What a parameter may be used for, in five marks, and the table of rules that gives them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 TRUST = 0.10  # 95 % half-width over value: good enough to design with
@@ -12,6 +12,45 @@ LARGEST_SHARE = 10.0  # that is printed
 MARKS = TRUSTED, CAREFUL, SMALL, UNSURE, USELESS = (
     "trust", "use with care", "less than 5 % of the row", "do not rely on", "do not use",
 )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """One estimate as the rules of the marks read it, whatever estimated it.
+
+    Attributes
+    ----------
+    name : str
+    share : float
+        95 % half-width over what it is judged against.
+    against : tuple of str
+        What speaks against it beside its width, a plain line each.
+    small : bool
+        Less than 5 % of its row, and known to be so.
+    unusable : bool
+        The data do not tell it at all.
+    """
+
+    name: str
+    share: float
+    against: tuple[str, ...] = ()
+    small: bool = False
+    unusable: bool = False
+
+
+# Mark to what it needs, of an estimate and the largest share to be used with care; the first holds.
+MARK_RULES: tuple[tuple[str, Callable[[Judged, float], bool]], ...] = (
+    (USELESS, lambda one, fair: one.unusable),
+    (UNSURE, lambda one, fair: bool(one.against) or not one.share <= fair),
+    (SMALL, lambda one, fair: one.small),
+    (CAREFUL, lambda one, fair: one.share > TRUST),
+    (TRUSTED, lambda one, fair: True),
+)
+
+
+def mark_of(one: Judged, fair: float = FAIR) -> str:
+    """Return the mark of an estimate."""
+    return next(mark for mark, holds in MARK_RULES if holds(one, fair))
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,12 +87,3 @@ def share_text(share: float, fair: float = FAIR) -> str:
     text = f"{100.0 * share:.0f}"
     beyond = any(share > limit and text == f"{100.0 * limit:.0f}" for limit in (TRUST, fair))
     return f"{100.0 * share:.1f} %" if beyond else f"{text} %"
-
-
-def first_lines(heading: str, marks: Mapping[str, str], fair: float) -> list[str]:
-    """Return the heading, then what is within a tenth and what within `fair` of its size."""
-    trusted = ", ".join(names_marked(marks, TRUSTED))
-    lines = [heading, f"  trust (within 10 %):  {trusted or 'nothing'}"]
-    if careful := names_marked(marks, CAREFUL):
-        lines.append(f"  use with care (10 to {100.0 * fair:.0f} %):  {', '.join(careful)}")
-    return lines

@@ -1,280 +1,111 @@
-"""What must hold before a parameter of a linear model is trusted: one short rule for each.
+"""What must hold before an estimate is trusted: one table of short rules for every kind of answer.
 
-A rule returns doubts: parameters and a reason. A doubted parameter stands neither under "trust" nor
-under "use with care", whatever its interval. An interval counts noise and gusts, not what a model
-lacks: on a demonstration flight D_V was -0.33 +- 0.02 where -0.61 was true.
+A rule returns doubts: estimates and a reason. A doubted one stands neither under "trust" nor under
+"use with care", whatever its interval. An interval counts noise and gusts, not what a model lacks:
+on a demonstration flight D_V was -0.33 +- 0.02 where -0.61 was true.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from host.sysid.answer.command_lag import lag_lookalikes, unknown_lag
-from host.sysid.answer.correlated_inputs import derivatives_of_both
-from host.sysid.answer.doubt import Doubt, doubt
-from host.sysid.answer.feedback_pairs import alike_derivatives, feedback_of
+from host.sysid.answer.coefficient_view import CoefficientView, lag_beside
+from host.sysid.answer.doubt import Doubt, Evidence, doubt
+from host.sysid.answer.estimate_view import EstimateView
+from host.sysid.answer.feedback_pairs import feedback_of
 from host.sysid.answer.impossible_signs import impossible_signs
-from host.sysid.answer.method_agreement import disagreements
-from host.sysid.answer.parameter_places import leaning_on
-from host.sysid.checks.data_finding import Finding, open_channels
-from host.sysid.errors.systematic_errors import is_template, scaled_by_airspeed
+from host.sysid.answer.linear_rules import (
+    delay_at_bound,
+    driven_by_inputs,
+    lag_unknown,
+    methods_disagree,
+    motion_left_out,
+    on_a_bound,
+    one_input_for_two,
+)
+from host.sysid.answer.linear_view import LinearView
+from host.sysid.checks.data_finding import open_channels
 from host.sysid.linear.linear_answer import Answer
-from host.sysid.models.diagnostics import SignalFit
-from host.sysid.models.residual_delays import STANDARD_DELAYS
-from host.sysid.validation.prediction_limits import FAILS, Prediction
 
 if TYPE_CHECKING:
-    pass
+    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 
-AIRSPEED = "airspeed_mps"
-WORSE_THAN_NONE = 1.0  # NRMSE: the mean would do better
-# Of power along what inputs drive over that of noise: half-widths are more than doubled by it.
-LARGE_RATIO = 4.0
-# What they drive, over an output's motion: below it widening answers for it. Right models of logs
-# in calm air show 0.4 to 2.1 %, a hidden lag 10 to 45, softening by 40 % 4 to 15 (laterally),
-# airspeed that is 10 % wrong 3 to 6.
-MATERIAL = 0.025
-WHITE_P = 0.01  # of Ljung-Box: above it the residual is a sensor's noise
-NEAR_BOUND = 1e-6  # of a bound's distance to the start, or of its size
+Rule = Callable[[EstimateView, Evidence], list[Doubt]]
 
 
-@dataclass(frozen=True)
-class Evidence:
-    """What beside an answer speaks against it.
-
-    Attributes
-    ----------
-    beside : tuple of Answer
-        All linear answers of the same data, this one among them.
-    findings : tuple of Finding
-        Of the data checks.
-    """
-
-    beside: tuple[Answer, ...] = ()
-    findings: tuple[Finding, ...] = ()
-
-
-def doubts_of(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """Return every doubt about the parameters of an answer, in the order of the rules."""
-    return [one for rule in RULES for one in rule(answer, evidence)]
-
-
-def fit_fails(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """The fitted data themselves are not explained, and not because a sensor is noisy."""
-    return [
-        one
-        for fit in answer.fits
-        if fails(fit) and not _as_gusts_make(answer.explained, fit)
-        for one in _about(
-            answer, [fit.name], f"the fit fails in {fit.name} (NRMSE {percent(fit.nrmse)})"
-        )
-    ]
-
-
-def not_predicted(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """The unseen maneuver differs by more than noise, gusts and the covariance allow."""
-    return [
-        one
-        for fit in unpredicted(answer)
-        for one in _about(answer, [fit.name], f"{fit.name} is not predicted{_allowed(answer, fit)}")
-    ]
-
-
-def driven_by_inputs(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """The inputs drive more of what the fit leaves than widening can answer for, and not little."""
-    if answer.coherence is None:
-        return []
-    left, shares = {f.name: f.nrmse for f in answer.fits}, answer.coherence.driven_shares()
-    names = [
-        name
-        for name in answer.coherence.dominated(LARGE_RATIO)
-        if not left.get(name, np.inf) * shares[name] < MATERIAL
-    ]
-    likely = answer.coherence.likely_error
-    like = f", most like {likely}" if likely else ""
-    reason = f"the inputs drive what the fit leaves of {', '.join(names)}{like}"
-    return _about(answer, names, reason)
-
-
-def delay_at_bound(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """A delay at its bound is what a model lacks in that signal."""
-    groups = [g for g in (*STANDARD_DELAYS, *answer.model.delays) if g.name in answer.at_bound]
-    return [
-        one
-        for output in dict.fromkeys(y for g in groups for y in g.outputs)
-        for one in _about(answer, [output], f"the delay of {output} is at its bound")
-    ]
-
-
-def on_a_bound(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """The search wanted a value beyond what was allowed."""
-    half = answer.result.half_width()
-    names = [
-        p.name
-        for k, p in enumerate(answer.model.parameters)
-        if any(_reached(float(answer.result.estimate[k]), b) for b in (p.lower, p.upper))
-        or (half[k] == 0.0 and answer.result.estimate[k] != 0.0)
-    ]
-    return _named(answer, names, "the estimate is on its bound")
-
-
-def impossible_sign(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """A sign that no aircraft has; of a user's own model only the bounds speak."""
-    if answer.own_model:
-        return []
-    values = {p.name: answer.result.value(p.name) for p in answer.model.parameters}
-    return [
-        one
-        for name, reason in impossible_signs(values).items()
-        for one in _named(answer, [name], reason)
-    ]
-
-
-def methods_disagree(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """Another method that is valid in this noise differs beyond the joint interval."""
-    return [
-        one
-        for name, reason in disagreements(answer, evidence.beside).items()
-        for one in _named(answer, [name], f"methods disagree: {reason}")
-    ]
-
-
-def one_input_for_two(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """Two inputs moved as one, and a regression left one of them out."""
-    return _named(answer, derivatives_of_both(answer), "of both inputs, one was left out")
-
-
-def motion_left_out(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """A reduced template was fitted without what other states do: short records do not show it."""
-    if not answer.left_out:
-        return []
-    reason = f"what {' and '.join(answer.left_out)} does beside {answer.template} is in no interval"
-    return _about(answer, answer.model.states, reason)
-
-
-def open_finding(answer: Answer, evidence: Evidence) -> list[Doubt]:
+def open_finding(view: EstimateView, evidence: Evidence) -> list[Doubt]:
     """The data checks found something in that channel, and nothing has closed it."""
     return [
         one
         for channel, check in open_channels(evidence.findings).items()
-        for one in _named(
-            answer,
-            leaning_on(answer.model, {channel}) | _divided_by(answer, channel),
-            f"{channel} has an open finding ({check})",
+        for one in doubt(
+            view.leaning_on(channel), view.names, f"{channel} has an open finding ({check})"
         )
     ]
 
 
-def _divided_by(answer: Answer, channel: str) -> set[str]:
-    """Return the parameters that a column scales beside its own equation.
-
-    Airspeed is in the numbers of a model, where it is no state: the templates have forces over it.
-    With an aircraft file dynamic pressure turns every derivative into a coefficient.
-    """
-    if channel != AIRSPEED:
-        return set()
-    if answer.coefficient_parts is not None:
-        return {p.name for p in answer.model.parameters}
-    known = answer.trim.known and is_template(answer.model, answer.trim)
-    return scaled_by_airspeed(answer.model, answer.trim) if known else set()
-
-
-def input_feedback(answer: Answer, evidence: Evidence) -> list[Doubt]:
+def input_feedback(view: EstimateView, evidence: Evidence) -> list[Doubt]:
     """A surface is a function of states: in one equation their derivatives are alike."""
     return [
         one
         for law in feedback_of(evidence.findings)
-        for one in _named(
-            answer,
-            [n for group in alike_derivatives(answer.model, law) for n in group],
+        for one in doubt(
+            view.alike(law),
+            view.names,
             f"{law.surface} follows {' and '.join(law.signals)}: they cannot be told apart",
         )
     ]
 
 
-def lag_unknown(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """A lag that nothing tells is under another name in what the commands do."""
-    why = unknown_lag(answer)
-    reason = f"the lag behind the commands is not known ({why}): they cannot be told apart"
-    return _named(answer, lag_lookalikes(answer), reason) if why else []
+def fit_fails(view: EstimateView, evidence: Evidence) -> list[Doubt]:
+    """The fitted data themselves are not explained, and not because a sensor is noisy."""
+    return [one for names, why in view.failures() for one in doubt(names, view.names, why)]
 
 
-Rule = Callable[[Answer, Evidence], list[Doubt]]
-RULES: tuple[Rule, ...] = (
-    open_finding, input_feedback, lag_unknown, fit_fails, not_predicted, driven_by_inputs,
-    delay_at_bound, on_a_bound, impossible_sign, methods_disagree, one_input_for_two,
-    motion_left_out,
-)  # fmt: skip
+def not_predicted(view: EstimateView, evidence: Evidence) -> list[Doubt]:
+    """An unseen maneuver differs by more than what was fitted, noise and intervals allow."""
+    return [one for names, why in view.unpredicted() for one in doubt(names, view.names, why)]
 
 
-def unpredicted(answer: Answer) -> list[SignalFit]:
-    """Return the outputs of unseen maneuvers that the model does not predict.
-
-    Half of an output's deviation is a failure whatever is allowed, but for white noise: noise as
-    slow as a phugoid allows anything. Not what gusts among the states of the model make, which one
-    sample tells of the next.
-    """
-    allowed = answer.predictions
+def impossible_sign(view: EstimateView, evidence: Evidence) -> list[Doubt]:
+    """A sign that no aircraft has; of a user's own model only the bounds speak."""
     return [
-        f
-        for f in answer.validation
-        if (fails(f) and not _as_gusts_make(allowed, f))
-        or (f.name in allowed and not allowed[f.name].holds)
+        one
+        for name, reason in impossible_signs(view.values).items()
+        for one in doubt([name], view.names, reason)
     ]
 
 
-def _as_gusts_make(allowed: Mapping[str, Prediction], fit: SignalFit) -> bool:
-    """Return whether an output is missed by no more than gusts among the model's states make.
-
-    They are part of its motion: what misses all of it is not theirs.
-    """
-    found = allowed.get(fit.name)
-    return found is not None and found.by_gusts and found.holds and fit.nrmse < WORSE_THAN_NONE
-
-
-def fails(fit: SignalFit) -> bool:
-    """Return whether an output is not explained, and not because a sensor is noisy."""
-    return not fit.nrmse < FAILS and not (fit.nrmse < WORSE_THAN_NONE and fit.ljung_box_p > WHITE_P)
-
-
-def unpredicted_states(answer: Answer) -> dict[str, str]:
-    """Return the states that the model does not carry, and why: for modes that consist of them."""
-    found = {f.name: f"{f.name} is not predicted" for f in unpredicted(answer)}
-    for group in (*STANDARD_DELAYS, *answer.model.delays):
-        if group.name in answer.at_bound:
-            found |= {
-                y: f"the delay of {y} is at its bound" for y in group.outputs if y not in found
-            }
-    return {s: found[s] for s in answer.model.states if s in found}
-
-
-def _about(answer: Answer, signals: Iterable[str], reason: str) -> list[Doubt]:
-    return _named(answer, leaning_on(answer.model, set(signals)), reason)
-
-
-def _named(answer: Answer, names: Iterable[str], reason: str) -> list[Doubt]:
-    aircraft = (p.name for p in answer.model.parameters if not p.name.startswith("imu_"))
-    return doubt(names, aircraft, reason)
-
-
-def _allowed(answer: Answer, fit: SignalFit) -> str:
-    found = answer.predictions.get(fit.name)
-    if found is None or found.holds:
-        return f" (NRMSE {percent(fit.nrmse)})"
-    return f" (NRMSE {percent(found.nrmse)}, noise and intervals allow {percent(found.largest)})"
-
-
-def percent(share: float) -> str:
-    """Return a share for people; a simulation that diverges has none."""
-    return f"{100.0 * share:.0f} %" if math.isfinite(share) else "none, it diverges"
-
-
-def _reached(value: float, bound: float) -> bool:
-    return bool(np.isfinite(bound)) and abs(value - bound) <= NEAR_BOUND * max(
-        abs(bound), NEAR_BOUND
+def _of_linear(rule: Callable[[Answer, Evidence], list[Doubt]]) -> Rule:
+    """Return a rule that only a linear model can break."""
+    return lambda view, evidence: (
+        rule(view.answer, evidence) if isinstance(view, LinearView) else []
     )
+
+
+def _of_coefficients(rule: Callable[[CoefficientAnswer], list[Doubt]]) -> Rule:
+    """Return a rule that only coefficients fitted directly can break."""
+    return lambda view, evidence: rule(view.answer) if isinstance(view, CoefficientView) else []
+
+
+RULES: tuple[Rule, ...] = (
+    open_finding,
+    input_feedback,
+    _of_linear(lag_unknown),
+    fit_fails,
+    not_predicted,
+    _of_linear(driven_by_inputs),
+    _of_linear(delay_at_bound),
+    _of_linear(on_a_bound),
+    impossible_sign,
+    _of_linear(methods_disagree),
+    _of_linear(one_input_for_two),
+    _of_linear(motion_left_out),
+    _of_coefficients(lag_beside),
+)
+
+
+def doubts_of(view: EstimateView, evidence: Evidence) -> list[Doubt]:
+    """Return every doubt about the estimates of an answer, in the order of the rules."""
+    return [one for rule in RULES for one in rule(view, evidence)]

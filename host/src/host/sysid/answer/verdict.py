@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from host.sysid.answer.coefficient_rules import coefficient_doubts
-from host.sysid.answer.coefficient_verdict import coefficient_marks, coefficient_verdict
-from host.sysid.answer.feedback_pairs import feedback_of
-from host.sysid.answer.linear_verdict import linear_marks, linear_verdict
-from host.sysid.answer.marks import Verdict
+from host.sysid.answer.coefficient_view import CoefficientView
+from host.sysid.answer.doubt import Doubt, Evidence, reasons_by_name
+from host.sysid.answer.estimate_view import EstimateView
+from host.sysid.answer.linear_view import LinearView
+from host.sysid.answer.marks import (
+    CAREFUL,
+    TRUSTED,
+    Judged,
+    Verdict,
+    mark_of,
+    names_marked,
+    share_text,
+)
 from host.sysid.answer.model_agreement import disagreements_of_models
-from host.sysid.answer.trust_rules import Evidence, doubts_of
-from host.sysid.checks.data_finding import Finding, open_channels
+from host.sysid.answer.trust_rules import doubts_of, input_feedback, open_finding
+from host.sysid.checks.data_finding import Finding
 from host.sysid.linear.linear_answer import Answer
 from host.sysid.reconstruction.sensor_corrections import correction_lines
 
@@ -38,19 +47,101 @@ def judge(
         Of the data checks.
     """
     evidence = Evidence(tuple(linear), tuple(findings))
-    doubts = [doubts_of(answer, evidence) for answer in linear]
-    if coefficients is None:
-        return tuple(linear_verdict(a, d, findings) for a, d in zip(linear, doubts, strict=True))
-    direct = coefficient_doubts(coefficients, open_channels(findings), feedback_of(findings))
-    marks = coefficient_marks(coefficients, direct)
-    for answer, own in zip(linear, doubts, strict=True):
-        here, there = disagreements_of_models(
-            answer, coefficients, linear_marks(answer, own), marks
-        )
-        own += here
-        direct = [*direct, *there]
-    judged = (linear_verdict(a, d, findings) for a, d in zip(linear, doubts, strict=True))
-    return (*judged, coefficient_verdict(coefficients, direct))
+    views: list[EstimateView] = [LinearView(answer) for answer in linear]
+    if coefficients is not None:
+        views.append(CoefficientView(coefficients))
+    doubts = [doubts_of(view, evidence) for view in views]
+    if coefficients is not None:
+        marks = [_marks(view, own) for view, own in zip(views, doubts, strict=True)]
+        for k, answer in enumerate(linear):
+            here, there = disagreements_of_models(answer, coefficients, marks[k], marks[-1])
+            doubts[k] += here
+            doubts[-1] += there
+    return tuple(verdict(view, own, findings) for view, own in zip(views, doubts, strict=True))
+
+
+def verdict(
+    view: EstimateView, doubts: Sequence[Doubt], findings: Sequence[Finding] = ()
+) -> Verdict:
+    """Return the verdict on each estimate of an answer.
+
+    Parameters
+    ----------
+    view : EstimateView
+        Of the answer.
+    doubts : sequence of Doubt
+        All there are.
+    findings : sequence of Finding
+        Of the data checks.
+    """
+    judged, marks = _doubted(view, doubts), _marks(view, doubts)
+    lines = [
+        view.heading,
+        *view.first_lines(),
+        *_mark_lines(view, marks),
+        *view.width_lines(judged),
+        *_doubt_lines(view, doubts),
+        *view.further_lines(findings),
+    ]
+    reasons = {
+        one.name: (f"95 % half-width {share_text(one.share, view.fair)}", *one.against)
+        for one in judged
+    }
+    return Verdict(view.heading, marks, tuple(lines), reasons)
+
+
+def doubted_by_findings(
+    linear: Sequence[Answer], coefficients: CoefficientAnswer | None, findings: Sequence[Finding]
+) -> set[str]:
+    """Return what findings of the data checks speak against.
+
+    Parameters
+    ----------
+    linear, coefficients, findings
+        As `judge`.
+
+    Returns
+    -------
+    set of str
+        Coefficients where they were fitted directly, else derivatives of the linear models.
+    """
+    views: list[EstimateView] = [LinearView(answer) for answer in linear]
+    if coefficients is not None:
+        views = [CoefficientView(coefficients)]
+    evidence = Evidence(findings=tuple(findings))
+    doubts = [rule(view, evidence) for view in views for rule in (open_finding, input_feedback)]
+    return {name for some in doubts for one in some for name in one.names}
+
+
+def _doubted(view: EstimateView, doubts: Sequence[Doubt]) -> list[Judged]:
+    """Return the estimates with every doubt about them."""
+    reasons = reasons_by_name(doubts)
+    return [
+        replace(one, against=(*one.against, *reasons.get(one.name, ()))) for one in view.estimates
+    ]
+
+
+def _marks(view: EstimateView, doubts: Sequence[Doubt]) -> dict[str, str]:
+    return {one.name: mark_of(one, view.fair) for one in _doubted(view, doubts)}
+
+
+def _mark_lines(view: EstimateView, marks: dict[str, str]) -> list[str]:
+    """Return what is within a tenth, and what within `fair`, of its size."""
+    trusted = ", ".join(names_marked(marks, TRUSTED))
+    lines = [f"  trust (within 10 %):  {trusted or 'nothing'}"]
+    if careful := names_marked(marks, CAREFUL):
+        lines.append(f"  use with care (10 to {100.0 * view.fair:.0f} %):  {', '.join(careful)}")
+    return lines
+
+
+def _doubt_lines(view: EstimateView, doubts: Sequence[Doubt]) -> list[str]:
+    """Return a line for each doubt."""
+    pairs = [(", ".join(n for n in one.names if n not in view.explained), one) for one in doubts]
+    return [
+        f"  do not rely on {names}, whatever the interval: {one.reason}"
+        for names, one in pairs
+        if names
+    ]
 
 
 def removed_error_lines(answers: Sequence[Answer]) -> list[str]:

@@ -1,0 +1,208 @@
+"""Coefficients fitted directly as their verdict reads them: causes, what to measure or fly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from host.sysid.answer.advised_inputs import advised_input
+from host.sysid.answer.doubt import Doubt, doubt
+from host.sysid.answer.linear_rules import percent
+from host.sysid.answer.marks import Judged, mark_of, share_text
+from host.sysid.checks.data_finding import Feedback, Finding
+from host.sysid.coefficients.coefficient_fit import FLAG_SHARE
+from host.sysid.coefficients.coefficient_model import standard_model
+
+if TYPE_CHECKING:
+    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+
+WORSE = 1.25  # NRMSE of unseen over fitted maneuvers: more is a model that does not carry over
+FAILS = 1.0  # NRMSE below 4.5 Hz, gusts in it: the mean would do better
+FORCES = ("CL", "CD", "CX", "CZ")
+# Channel to the equations whose response it makes, and to the labels it multiplies; "" is all.
+LEANING: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "airspeed_mps": (("",), ()),
+    "qbar_pa": (("",), ()),
+    "ax_mps2": (FORCES, ()),
+    "az_mps2": (FORCES, ()),
+    "ay_mps2": (("CY",), ()),
+    "alpha_rad": (("CL", "CD"), ("alpha",)),
+    "beta_rad": ((), ("beta",)),
+    "p_radps": (("Cl",), ("p",)),
+    "q_radps": (("Cm",), ("q",)),
+    "r_radps": (("Cn",), ("r",)),
+    "elevator_rad": ((), ("de",)),
+    "aileron_rad": ((), ("da",)),
+    "rudder_rad": ((), ("dr",)),
+    "throttle": (("CD", "CX"), ()),
+}
+
+
+@dataclass(frozen=True)
+class CoefficientView:
+    """What rules and verdict read of coefficients fitted directly (`EstimateView`)."""
+
+    answer: CoefficientAnswer
+
+    @property
+    def heading(self) -> str:
+        """The terms, the maneuvers of each axis."""
+        answer = self.answer
+        along = sum(w.longitudinal for w in answer.windows)
+        own = "" if answer.model == standard_model() else f" by the terms of '{answer.model.name}'"
+        return (
+            f"coefficients{own}: {along} maneuvers of the elevator, {len(answer.windows) - along}"
+            " of aileron and rudder fitted jointly, errors of the instrument beside them"
+        )
+
+    @property
+    def fair(self) -> float:
+        """Largest share of a half-width in its estimate that is used with care."""
+        return FLAG_SHARE
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Coefficients in the order of the fit."""
+        return tuple(d.name for d in self.answer.fit.derivatives)
+
+    @cached_property
+    def estimates(self) -> tuple[Judged, ...]:
+        """Each coefficient by its width alone: one beyond its size is of no use."""
+        found = self.answer.fit.derivatives
+        return tuple(Judged(d.name, d.share, unusable=d.share > 1.0) for d in found)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Estimates by the standard terms; of a user's own nothing is known."""
+        if self.answer.model != standard_model():
+            return {}
+        return {d.name: d.value for d in self.answer.fit.derivatives}
+
+    @property
+    def explained(self) -> tuple[str, ...]:
+        """Names with a line of their own whatever is doubted: none."""
+        return ()
+
+    def leaning_on(self, channel: str) -> list[str]:
+        """Return the coefficients whose equation a column makes, and those that it multiplies."""
+        equations, labels = LEANING.get(channel, ((), ()))
+        return [n for n in self.names if n.startswith(equations) or n.split("_")[-1] in labels]
+
+    def alike(self, law: Feedback) -> list[str]:
+        """Return the coefficients that a feedback law makes alike."""
+        own = LEANING[law.surface][1]
+        others = [label for s in law.signals for label in LEANING.get(s, ((), ()))[1]]
+        names = [n.split("_") for n in self.names if "_" in n]
+        both = [{n[0] for n in names if n[-1] in labels} for labels in (own, others)]
+        equations = both[0] & both[1]
+        return ["_".join(n) for n in names if n[0] in equations and n[-1] in (*own, *others)]
+
+    def failures(self) -> list[tuple[list[str], str]]:
+        """Return the coefficients of equations that the fit does not explain, and the reason."""
+        found = self.answer.fit.prediction
+        return [
+            (
+                _of_equation(self.names, equation),
+                f"the fit fails in {equation} (NRMSE {percent(nrmse)})",
+            )
+            for equation, nrmse in (found.fitted if found else {}).items()
+            if not nrmse < FAILS
+        ]
+
+    def unpredicted(self) -> list[tuple[list[str], str]]:
+        """Return the coefficients of equations that do not carry over, and the reason."""
+        return [
+            (_of_equation(self.names, equation), f"{equation} is not predicted ({words})")
+            for equation, words in _not_carried_over(self.answer).items()
+        ]
+
+    def first_lines(self) -> list[str]:
+        """Return nothing: the search has no other end."""
+        return []
+
+    def width_lines(self, judged: Sequence[Judged]) -> list[str]:
+        """Return what was assumed, and the coefficients with too wide intervals and why."""
+        remarks = [f"  {remark}" for remark in self.answer.remarks]
+        return [*remarks, *_flag_lines(self.answer, judged)]
+
+    def further_lines(self, findings: Sequence[Finding]) -> list[str]:
+        """Return the lines on maneuvers that do not agree, and on prediction."""
+        return [*_agreement_lines(self.answer), _prediction_line(self.answer)]
+
+
+def lag_beside(answer: CoefficientAnswer) -> list[Doubt]:
+    """Surfaces seem to lag behind their columns, and that moves a moment beyond its intervals."""
+    names = [d.name for d in answer.fit.derivatives]
+    return [
+        one
+        for equation, far in answer.lagging.items()
+        for one in doubt(
+            _of_equation(names, equation),
+            names,
+            f"surfaces seem to lag behind their columns, which moves {equation} by {far:.1f}"
+            " half-widths",
+        )
+    ]
+
+
+def _of_equation(names: Sequence[str], equation: str) -> list[str]:
+    return [n for n in names if n.split("_")[0] == equation]
+
+
+def _not_carried_over(answer: CoefficientAnswer) -> dict[str, str]:
+    """Return the equations that do not carry over to unseen maneuvers, with both figures."""
+    found = answer.fit.prediction
+    if found is None:
+        return {}
+    return {
+        name: f"NRMSE {100.0 * held_out:.1f} %, fitted {100.0 * found.fitted[name]:.1f} %"
+        for name, held_out in found.left_out.items()
+        if held_out > WORSE * found.fitted[name]
+    }
+
+
+def _flag_lines(answer: CoefficientAnswer, judged: Sequence[Judged]) -> list[str]:
+    """Return the coefficients with too wide intervals, their causes and the remedies."""
+    lines, advice = [], set()
+    for d, one in zip(answer.fit.derivatives, judged, strict=True):
+        if not d.flagged:
+            continue
+        cause, part = answer.causes.get(d.name, ("", 0.0))
+        why = f"{100.0 * part:.0f} % of the variance is {cause}" if cause else "excited too little"
+        lines.append(
+            f"  {mark_of(one, FLAG_SHARE)} {d.name}: +- {share_text(d.share, FLAG_SHARE)}, {why}"
+        )
+        fly = advised_input(d.name) or "a larger input"
+        advice.add(f"measure {cause} better" if cause else f"fly {fly}")
+    if advice:
+        lines.append(f"  to learn them, {'; '.join(sorted(advice))}")
+    return lines
+
+
+def _agreement_lines(answer: CoefficientAnswer) -> list[str]:
+    """Return on which coefficients the maneuvers do not agree."""
+    found = answer.fit.maneuver_agreement
+    return [
+        f"  maneuvers do not agree on {name}: they scatter {found.factor[k]:.1f} times what noise"
+        f" allows (chi-square {found.chi_square[k]:.1f} on {found.maneuvers[k] - 1.0:.1f}),"
+        " interval widened to it"
+        for k, name in enumerate(found.names)
+        if found.factor[k] > 1.0
+    ]
+
+
+def _prediction_line(answer: CoefficientAnswer) -> str:
+    """Return whether each maneuver is predicted by a fit to the others."""
+    found, count = answer.fit.prediction, len(answer.windows)
+    if found is None:
+        return (
+            "  no maneuver could be left out to be predicted: each alone tells a term; fly every"
+            " input at least twice"
+        )
+    poor = [f"{name} ({words})" for name, words in _not_carried_over(answer).items()]
+    return (
+        f"  prediction of unseen maneuvers ({len(found.windows)} of {count}, each by the others): "
+        + ("fails for " + ", ".join(poor) if poor else "holds for every coefficient")
+    )

@@ -1,0 +1,58 @@
+"""What rules and verdict read of an answer, whatever estimated it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import Protocol
+
+from host.sysid.answer.marks import Judged
+from host.sysid.checks.data_finding import Feedback, Finding
+
+
+class EstimateView(Protocol):
+    """An answer as its verdict reads it: estimates, what each leans on, lines of its own."""
+
+    @property
+    def heading(self) -> str:
+        """The model, its maneuvers and method."""
+
+    @property
+    def fair(self) -> float:
+        """Largest share of a half-width in its estimate that is used with care."""
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Derivatives or coefficients in the model's order."""
+
+    @property
+    def estimates(self) -> Sequence[Judged]:
+        """Each estimate by itself, without the doubts of the rules."""
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Estimates whose sign the house knows; none of a user's own model."""
+
+    @property
+    def explained(self) -> Collection[str]:
+        """Names that have a line of their own, whatever is doubted."""
+
+    def leaning_on(self, channel: str) -> Collection[str]:
+        """Return the estimates that an error of a column makes wrong."""
+
+    def alike(self, law: Feedback) -> Collection[str]:
+        """Return the estimates that a feedback law makes alike."""
+
+    def failures(self) -> Iterable[tuple[Collection[str], str]]:
+        """Return what the fit does not explain: estimates and the reason."""
+
+    def unpredicted(self) -> Iterable[tuple[Collection[str], str]]:
+        """Return what unseen maneuvers contradict: estimates and the reason."""
+
+    def first_lines(self) -> Sequence[str]:
+        """Return the lines right behind the heading."""
+
+    def width_lines(self, judged: Sequence[Judged]) -> Sequence[str]:
+        """Return the lines on estimates that are too wide or small."""
+
+    def further_lines(self, findings: Sequence[Finding]) -> Sequence[str]:
+        """Return the lines behind the doubts: identifiability, inputs, prediction."""

@@ -1,0 +1,185 @@
+"""What only a linear model can break: bounds, delays, lags, other methods, what inputs drive."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from host.sysid.answer.command_lag import lag_lookalikes, unknown_lag
+from host.sysid.answer.correlated_inputs import derivatives_of_both
+from host.sysid.answer.doubt import Doubt, Evidence, doubt
+from host.sysid.answer.method_agreement import disagreements
+from host.sysid.answer.parameter_places import leaning_on
+from host.sysid.errors.systematic_errors import is_template, scaled_by_airspeed
+from host.sysid.linear.linear_answer import Answer
+from host.sysid.models.diagnostics import SignalFit
+from host.sysid.models.residual_delays import STANDARD_DELAYS
+from host.sysid.validation.prediction_limits import FAILS, Prediction
+
+AIRSPEED = "airspeed_mps"
+WORSE_THAN_NONE = 1.0  # NRMSE: the mean would do better
+# Of power along what inputs drive over that of noise: half-widths are more than doubled by it.
+LARGE_RATIO = 4.0
+# What they drive, over an output's motion: below it widening answers for it. Right models of logs
+# in calm air show 0.4 to 2.1 %, a hidden lag 10 to 45, softening by 40 % 4 to 15 (laterally),
+# airspeed that is 10 % wrong 3 to 6.
+MATERIAL = 0.025
+WHITE_P = 0.01  # of Ljung-Box: above it the residual is a sensor's noise
+NEAR_BOUND = 1e-6  # of a bound's distance to the start, or of its size
+
+
+def driven_by_inputs(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """The inputs drive more of what the fit leaves than widening can answer for, and not little."""
+    if answer.coherence is None:
+        return []
+    left, shares = {f.name: f.nrmse for f in answer.fits}, answer.coherence.driven_shares()
+    names = [
+        name
+        for name in answer.coherence.dominated(LARGE_RATIO)
+        if not left.get(name, np.inf) * shares[name] < MATERIAL
+    ]
+    likely = answer.coherence.likely_error
+    like = f", most like {likely}" if likely else ""
+    reason = f"the inputs drive what the fit leaves of {', '.join(names)}{like}"
+    return _about(answer, names, reason)
+
+
+def delay_at_bound(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """A delay at its bound is what a model lacks in that signal."""
+    groups = [g for g in (*STANDARD_DELAYS, *answer.model.delays) if g.name in answer.at_bound]
+    return [
+        one
+        for output in dict.fromkeys(y for g in groups for y in g.outputs)
+        for one in _about(answer, [output], f"the delay of {output} is at its bound")
+    ]
+
+
+def on_a_bound(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """The search wanted a value beyond what was allowed."""
+    half = answer.result.half_width()
+    names = [
+        p.name
+        for k, p in enumerate(answer.model.parameters)
+        if any(_reached(float(answer.result.estimate[k]), b) for b in (p.lower, p.upper))
+        or (half[k] == 0.0 and answer.result.estimate[k] != 0.0)
+    ]
+    return _named(answer, names, "the estimate is on its bound")
+
+
+def methods_disagree(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """Another method that is valid in this noise differs beyond the joint interval."""
+    return [
+        one
+        for name, reason in disagreements(answer, evidence.beside).items()
+        for one in _named(answer, [name], f"methods disagree: {reason}")
+    ]
+
+
+def one_input_for_two(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """Two inputs moved as one, and a regression left one of them out."""
+    return _named(answer, derivatives_of_both(answer), "of both inputs, one was left out")
+
+
+def motion_left_out(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """A reduced template was fitted without what other states do: short records do not show it."""
+    if not answer.left_out:
+        return []
+    reason = f"what {' and '.join(answer.left_out)} does beside {answer.template} is in no interval"
+    return _about(answer, answer.model.states, reason)
+
+
+def lag_unknown(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """A lag that nothing tells is under another name in what the commands do."""
+    why = unknown_lag(answer)
+    reason = f"the lag behind the commands is not known ({why}): they cannot be told apart"
+    return _named(answer, lag_lookalikes(answer), reason) if why else []
+
+
+def divided_by(answer: Answer, channel: str) -> set[str]:
+    """Return the parameters that a column scales beside its own equation.
+
+    Airspeed is in the numbers of a model, where it is no state: the templates have forces over it.
+    With an aircraft file dynamic pressure turns every derivative into a coefficient.
+    """
+    if channel != AIRSPEED:
+        return set()
+    if answer.coefficient_parts is not None:
+        return {p.name for p in answer.model.parameters}
+    known = answer.trim.known and is_template(answer.model, answer.trim)
+    return scaled_by_airspeed(answer.model, answer.trim) if known else set()
+
+
+def failing_fits(answer: Answer) -> list[SignalFit]:
+    """Return the fitted outputs that are not explained, and not because a sensor is noisy."""
+    return [f for f in answer.fits if fails(f) and not _as_gusts_make(answer.explained, f)]
+
+
+def unpredicted(answer: Answer) -> list[SignalFit]:
+    """Return the outputs of unseen maneuvers that the model does not predict.
+
+    Half of an output's deviation is a failure whatever is allowed, but for white noise: noise as
+    slow as a phugoid allows anything. Not what gusts among the states of the model make, which one
+    sample tells of the next.
+    """
+    allowed = answer.predictions
+    return [
+        f
+        for f in answer.validation
+        if (fails(f) and not _as_gusts_make(allowed, f))
+        or (f.name in allowed and not allowed[f.name].holds)
+    ]
+
+
+def _as_gusts_make(allowed: Mapping[str, Prediction], fit: SignalFit) -> bool:
+    """Return whether an output is missed by no more than gusts among the model's states make.
+
+    They are part of its motion: what misses all of it is not theirs.
+    """
+    found = allowed.get(fit.name)
+    return found is not None and found.by_gusts and found.holds and fit.nrmse < WORSE_THAN_NONE
+
+
+def fails(fit: SignalFit) -> bool:
+    """Return whether an output is not explained, and not because a sensor is noisy."""
+    return not fit.nrmse < FAILS and not (fit.nrmse < WORSE_THAN_NONE and fit.ljung_box_p > WHITE_P)
+
+
+def unpredicted_states(answer: Answer) -> dict[str, str]:
+    """Return the states that the model does not carry, and why: for modes that consist of them."""
+    found = {f.name: f"{f.name} is not predicted" for f in unpredicted(answer)}
+    for group in (*STANDARD_DELAYS, *answer.model.delays):
+        if group.name in answer.at_bound:
+            found |= {
+                y: f"the delay of {y} is at its bound" for y in group.outputs if y not in found
+            }
+    return {s: found[s] for s in answer.model.states if s in found}
+
+
+def _about(answer: Answer, signals: Iterable[str], reason: str) -> list[Doubt]:
+    return _named(answer, leaning_on(answer.model, set(signals)), reason)
+
+
+def _named(answer: Answer, names: Iterable[str], reason: str) -> list[Doubt]:
+    aircraft = (p.name for p in answer.model.parameters if not p.name.startswith("imu_"))
+    return doubt(names, aircraft, reason)
+
+
+def missed_beyond(answer: Answer, fit: SignalFit) -> str:
+    """Return by how much an output is not predicted, and what was allowed."""
+    found = answer.predictions.get(fit.name)
+    if found is None or found.holds:
+        return f" (NRMSE {percent(fit.nrmse)})"
+    return f" (NRMSE {percent(found.nrmse)}, noise and intervals allow {percent(found.largest)})"
+
+
+def percent(share: float) -> str:
+    """Return a share for people; a simulation that diverges has none."""
+    return f"{100.0 * share:.0f} %" if math.isfinite(share) else "none, it diverges"
+
+
+def _reached(value: float, bound: float) -> bool:
+    return bool(np.isfinite(bound)) and abs(value - bound) <= NEAR_BOUND * max(
+        abs(bound), NEAR_BOUND
+    )

@@ -1,0 +1,202 @@
+"""A linear model as its verdict reads it: estimates, reasons of its own, what to fly again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from host.sysid.answer.advised_inputs import advised_input
+from host.sysid.answer.correlated_inputs import correlated_inputs
+from host.sysid.answer.feedback_pairs import alike_derivatives, combined_derivatives
+from host.sysid.answer.linear_rules import (
+    divided_by,
+    failing_fits,
+    missed_beyond,
+    percent,
+    unpredicted,
+)
+from host.sysid.answer.marks import FAIR, SMALL, UNSURE, Judged, mark_of, share_text
+from host.sysid.answer.parameter_places import leaning_on
+from host.sysid.answer.servo_lines import servo_lines
+from host.sysid.checks.data_finding import Feedback, Finding
+from host.sysid.errors.surface_motion import HELD_SURFACES
+from host.sysid.estimators.users_model import NOISE_CHOSEN
+from host.sysid.linear.linear_answer import Answer
+from host.sysid.models.diagnostics import NOT_IDENTIFIABLE, reference_values
+
+PLACE = "imu_"  # begins the name of a sensor's place: no property of the aircraft
+
+
+@dataclass(frozen=True)
+class LinearView:
+    """What rules and verdict read of a linear model (`EstimateView`)."""
+
+    answer: Answer
+
+    @property
+    def heading(self) -> str:
+        """The model, its maneuvers and method."""
+        answer, count = self.answer, len(self.answer.used)
+        fitted = "1 maneuver fitted" if count == 1 else f"{count} maneuvers fitted jointly"
+        by, held_out = answer.result.method, len(answer.held_out)
+        return f"{answer.template}: {fitted} by {by}, {held_out} held out"
+
+    @property
+    def fair(self) -> float:
+        """Largest share of a half-width in its estimate that is used with care."""
+        return FAIR
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Derivatives in the model's order."""
+        parameters = self.answer.model.parameters
+        return tuple(p.name for p in parameters if not p.name.startswith(PLACE))
+
+    @cached_property
+    def estimates(self) -> tuple[Judged, ...]:
+        """Each derivative by itself: its width, and whether the data tell it."""
+        answer, result = self.answer, self.answer.result
+        half = result.half_width()
+        size = reference_values(answer.model, answer.maneuvers, result.estimate)
+        flags = {r.name: r for r in answer.identifiability_flags}
+        lost = () if result.converged else ("no convergence",)
+        found = []
+        for name in self.names:
+            k = result.index(name)
+            flag = flags.get(name)
+            found.append(
+                Judged(
+                    name,
+                    float(half[k]) / max(float(size[k]), 1e-300),
+                    (flag.reason, *lost) if flag else lost,
+                    small=bool(size[k] > abs(float(result.estimate[k]))),
+                    unusable=bool(lost) or (flag is not None and flag.grade == NOT_IDENTIFIABLE),
+                )
+            )
+        return tuple(found)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Estimates of a template; none of a user's own model."""
+        parameters = () if self.answer.own_model else self.answer.model.parameters
+        return {p.name: self.answer.result.value(p.name) for p in parameters}
+
+    @property
+    def explained(self) -> set[str]:
+        """Derivatives that the data hardly tell: each has a line of its own."""
+        return {r.name for r in self.answer.identifiability_flags}
+
+    def leaning_on(self, channel: str) -> set[str]:
+        """Return the derivatives in a column's equation, and those that it multiplies or scales."""
+        return leaning_on(self.answer.model, {channel}) | divided_by(self.answer, channel)
+
+    def alike(self, law: Feedback) -> list[str]:
+        """Return the derivatives that a feedback law makes alike."""
+        return [name for group in alike_derivatives(self.answer.model, law) for name in group]
+
+    def failures(self) -> list[tuple[set[str], str]]:
+        """Return the derivatives of outputs that the fit does not explain, and the reason."""
+        return [
+            (
+                leaning_on(self.answer.model, {fit.name}),
+                f"the fit fails in {fit.name} (NRMSE {percent(fit.nrmse)})",
+            )
+            for fit in failing_fits(self.answer)
+        ]
+
+    def unpredicted(self) -> list[tuple[set[str], str]]:
+        """Return the derivatives of outputs that unseen maneuvers contradict, and the reason."""
+        return [
+            (
+                leaning_on(self.answer.model, {fit.name}),
+                f"{fit.name} is not predicted{missed_beyond(self.answer, fit)}",
+            )
+            for fit in unpredicted(self.answer)
+        ]
+
+    def first_lines(self) -> list[str]:
+        """Return the warning of a search that did not end."""
+        wrong = "  no convergence: estimates and intervals mean nothing, use another method"
+        return [] if self.answer.result.converged else [wrong]
+
+    def width_lines(self, judged: Sequence[Judged]) -> list[str]:
+        """Return which derivatives only their width rules out, and which are small."""
+        lines = []
+        wide = [
+            f"{one.name} ({share_text(one.share)})"
+            for one in judged
+            if mark_of(one) == UNSURE and not one.against
+        ]
+        if wide:
+            lines.append(f"  do not rely on (above 30 %):  {', '.join(wide)}")
+        if little := [one.name for one in judged if mark_of(one) == SMALL]:
+            lines.append(
+                f"  small (less than 5 % of their row, and known to be so):  {', '.join(little)}"
+            )
+        return lines
+
+    def further_lines(self, findings: Sequence[Finding]) -> list[str]:
+        """Return the lines on identifiability, inputs, servos, feedback and prediction."""
+        answer = self.answer
+        return [
+            *_identifiability_lines(answer),
+            *_input_lines(answer),
+            *servo_lines(answer),
+            *combined_derivatives(answer, findings),
+            *_data_lines(answer),
+        ]
+
+
+def _identifiability_lines(answer: Answer) -> list[str]:
+    """Return the parameters that cannot be identified, the reasons, and what to fly."""
+    flags = [r for r in answer.identifiability_flags if not r.name.startswith(PLACE)]
+    lines = []
+    for flag in flags:
+        warning = "do not use" if flag.grade == NOT_IDENTIFIABLE else "doubtful,"
+        lines.append(f"  {warning} {flag.name}: {flag.reason}")
+    inputs = {advised_input(flag.name) for flag in flags} - {""}
+    if inputs:
+        lines.append(f"  to learn them, fly {'; '.join(sorted(inputs))}")
+    return lines
+
+
+def _input_lines(answer: Answer) -> list[str]:
+    """Return the remarks on correlated inputs, and on inputs that did not move."""
+    lines = [
+        f"  {one} and {other} move together: fly them one at a time, without a mixer, or leave"
+        " one out of a model of your own"
+        for one, other in correlated_inputs(answer)
+    ]
+    lines += [
+        f"  {name} never moved: its derivatives are the bias under another name"
+        for name in answer.constant_inputs
+    ]
+    if answer.collinearity.severe:
+        pairs = ", ".join(f"{a} with {b}" for a, b, _ in answer.collinearity.pairs[:3])
+        lines.append("  the data are close to collinear" + (f" ({pairs})" if pairs else ""))
+    return lines
+
+
+def _data_lines(answer: Answer) -> list[str]:
+    """Return the lines on bounds, warnings, and prediction of held-out data."""
+    lines = [
+        f"  {name} is at its bound: no delay of that sensor, but what the model lacks there"
+        for name in answer.at_bound
+    ]
+    lines += [
+        f"  {text}" if text.startswith((NOISE_CHOSEN, HELD_SURFACES)) else f"  warning: {text}"
+        for text in answer.result.warnings
+    ]
+    poor = [f.name for f in unpredicted(answer)]
+    if answer.validation:
+        lines.append(
+            "  prediction of the unseen maneuver: "
+            + ("fails for " + ", ".join(poor) if poor else "holds for every output")
+        )
+    else:
+        lines.append(
+            "  nothing was left to be predicted: what the model lacks is in no interval; fly each"
+            " input three times"
+        )
+    return lines
