@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from host.planning.card_planning import design
+from host.planning.card_design import design
 from host.planning.predicted_widths import predict_widths
 from host.readers.even_grid import even_columns
 from host.sysid.answer import true_coefficients

@@ -25,7 +25,7 @@ from host.live.live_stream import LiveStream
 from host.live.test_point.point_estimate import PROMISE_FLIGHTS, PointEstimate, PointEstimator
 from host.live.test_point.point_watch import PointWatch
 from host.physical.calibration import calibration_of_text
-from host.planning.card_planning import design
+from host.planning.card_design import design
 from host.planning.point_widths import (
     PointPromise,
     identify_single_point,

@@ -13,7 +13,7 @@ import tempfile
 from pathlib import Path
 
 from host.export.toml import dumps
-from host.planning.card_planning import design, document
+from host.planning.card_design import design, document
 from studies.radio_flights import radio_flight
 
 from tests.browser.chromium import LAPTOP, PHONE, Chromium, Page

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from host.aircraft.linear_aircraft import load
-from host.live.live_program import _JsonLines
+from host.live.json_lines import JsonLines
 from host.live.live_sample import LIVE_UNITS, Array, LiveUpdate
 from host.live.test_point.card_progress import CardProgress, card_points
 from host.live.test_point.point_estimate import PointEstimate
@@ -413,7 +413,7 @@ def test_the_card_goes_on_when_a_point_is_good_and_stays_when_it_is_not(card: Ca
 def test_a_verdict_is_a_line_of_json_once(card: Card, response: AircraftResponse) -> None:
     watch = watched(card, flown(response, [(START_S, card.segments[1])]))
     lines: list[str] = []
-    shown = _JsonLines(lines.append)
+    shown = JsonLines(lines.append)
     for _ in range(3):
         shown.state(json.dumps({"type": "state", "test_point": watch.as_json()}))
     assert [json.loads(line)["type"] for line in lines] == ["verdict", "state"]

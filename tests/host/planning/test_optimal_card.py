@@ -12,7 +12,8 @@ from host.aircraft.linear_aircraft import load
 from host.cli import main
 from host.constants import NORMAL_95
 from host.planning import prior_range
-from host.planning.card_planning import TARGET_EXCURSIONS, exact, point_of
+from host.planning.card_design import TARGET_EXCURSIONS
+from host.planning.card_planning import exact, point_of
 from host.planning.identified_aircraft import identified_range
 from host.planning.optimal_card import (
     FIRST_DRAW,

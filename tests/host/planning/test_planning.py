@@ -14,6 +14,7 @@ from host.aircraft.linearisation import linearise
 from host.aircraft.trim import solve
 from host.cli import main
 from host.export.toml import dumps
+from host.planning import card_design
 from host.planning import card_planning as planning
 from host.twin.testcard import cards
 from host.twin.testcard.cards import parse
@@ -21,16 +22,16 @@ from host.twin.testcard.cards import parse
 
 @pytest.fixture(scope="module")
 def plan() -> planning.Plan:
-    return planning.judge(planning.design("ultrastick25e"))
+    return planning.judge(card_design.design("ultrastick25e"))
 
 
 def test_designed_inputs_reach_the_wanted_excursions(plan: planning.Plan) -> None:
     assert len(plan.points) == 12
     for point in plan.points:
         reached = {
-            "elevator": point.alpha_deg / planning.TARGET_EXCURSIONS["alpha_deg"],
-            "rudder": point.beta_deg / planning.TARGET_EXCURSIONS["beta_deg"],
-            "aileron": point.bank_deg / planning.TARGET_EXCURSIONS["bank_deg"],
+            "elevator": point.alpha_deg / card_design.TARGET_EXCURSIONS["alpha_deg"],
+            "rudder": point.beta_deg / card_design.TARGET_EXCURSIONS["beta_deg"],
+            "aileron": point.bank_deg / card_design.TARGET_EXCURSIONS["bank_deg"],
         }[point.axes[0]]
         assert 0.75 < reached < 1.25, point
         assert point.width_s >= 0.2
@@ -79,9 +80,9 @@ def test_bounds_shrink_with_amplitude_and_a_missing_axis_is_refused() -> None:
 
 
 def test_designed_card_comes_back_from_its_file(tmp_path: Path) -> None:
-    card = planning.design("kadetlt40")
+    card = card_design.design("kadetlt40")
     path = tmp_path / "card.toml"
-    path.write_text(dumps(planning.document(card)))
+    path.write_text(dumps(card_design.document(card)))
     assert cards.load(path).segments == card.segments
 
 

@@ -5,37 +5,30 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import socket
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from host.aircraft.file import load_measured
 from host.errors import HostError, UsageError
 from host.extras import install_hint
-from host.link.serial import DeviceError
 from host.live.estimates.live_estimates import LiveEstimates, live_estimates
-from host.live.estimates.wanted_widths import wanted_widths
 from host.live.ground_capture import GroundCapture, new_capture_path, utc_now
-from host.live.live_session import Audience, LiveSession
+from host.live.json_lines import JsonLines
+from host.live.listening_socket import listening_socket, own_addresses
+from host.live.live_request import LiveRequest, check_request, open_source
+from host.live.live_session import LiveSession
 from host.live.live_sources import (
     Source,
-    is_file_like,
-    port_source,
-    udp_source,
 )
 from host.live.live_stream import LiveStream
 from host.live.logger_learning import LoggerLearning
 from host.live.mavlink_bridge import MavlinkBridge
 from host.live.plotjuggler_bridge import PlotJugglerBridge
 from host.live.recording_watch import RecordingWatch
-from host.live.replay import RADIO_RATE_HZ, replay_source
-from host.live.udp_place import udp_place
 from host.log.capture_head import SUFFIX, CaptureHead
 from host.physical.calibration import Calibration, calibration_of_text, load_calibration
-from host.wire.flight_card import card_file
 from host.wire.schema_text import packed_schema
 
 if TYPE_CHECKING:
@@ -43,41 +36,10 @@ if TYPE_CHECKING:
 
     from host.live.test_point.point_watch import PointWatch
 
-PORT, MOST_PORT = 8050, 65535
-MOST_BAUD = 10_000_000
-_TRIES = 10
 _POLL_S = 0.1
 _LAST_S = 60.0  # for the last estimates, where nothing else is waited for
 _STATE_S = 0.2  # between two states
 _SILENT_S = 8.0  # the logger sends 20 rows a second and a hash every 5 s
-
-
-# Who works on the session too, and what to do before its capture is closed.
-Join = Callable[[LiveSession, Calibration], Callable[[], None]]
-
-
-@dataclass(slots=True)
-class LiveRequest:
-    """What was asked for on the command line."""
-
-    source: str | None = None
-    output: Path | None = None
-    baud: int | None = None
-    calibration: Path | None = None
-    rate_hz: float = RADIO_RATE_HZ
-    port: int | None = None
-    lan: bool = False
-    page: bool = True
-    json: bool = False
-    mavlink: str | None = None
-    plotjuggler: str | None = None
-    aircraft: str | None = None
-    wanted: str | None = None
-    card: str | None = None
-    flight_card: Path | None = None
-    seed: int = 0
-    opened: Source | None = None  # in place of what `source` names
-    joins: list[Join] = field(default_factory=list)
 
 
 @dataclass(slots=True)
@@ -101,49 +63,6 @@ class LiveSummary:
         ]
 
 
-def open_source(request: LiveRequest, tell: Callable[[str], None]) -> Source:
-    """Return what the request names; raises HostError in one line."""
-    text = request.source
-    virtual = text is not None and text.startswith("sim:")
-    if request.flight_card is not None and not virtual:
-        raise UsageError("--flight-card goes with sim:CARD: a real logger has its card in itself")
-    if text is not None and text.startswith("replay:"):
-        return replay_source(text.removeprefix("replay:"), request.rate_hz)
-    if text is not None and virtual:
-        try:
-            from host.live.simulated_source import SimulatedSource
-        except ImportError as error:
-            raise UsageError(
-                f"a virtual flight needs {error.name}: {install_hint(error.name)}"
-            ) from None
-        own = b"" if request.flight_card is None else card_file(request.flight_card)
-        return SimulatedSource(text.removeprefix("sim:"), request.seed, own).open(tell)
-    if text is not None and text.startswith("udp:"):
-        return udp_source(text)
-    if text is not None and is_file_like(text):
-        return replay_source(text, request.rate_hz)
-    return port_source(text, request.baud, tell)
-
-
-def _check(request: LiveRequest) -> None:
-    """Refuse a wrong argument before a device is opened and a file is made."""
-    for option, number, most in (
-        ("--port", request.port, MOST_PORT), ("--baud", request.baud, MOST_BAUD),
-    ):  # fmt: skip
-        if number is not None and not 0 < number <= most:
-            raise UsageError(f"{option} {number}: expected 1 to {most}")
-    for option, place in (("--mavlink", request.mavlink), ("--plotjuggler", request.plotjuggler)):
-        if place is not None:
-            udp_place(option, place)
-    wanted_widths(request.wanted)
-    if request.aircraft:
-        load_measured(request.aircraft)
-    if request.card is not None:
-        from host.twin.testcard import cards
-
-        cards.load(request.card)
-
-
 def run_live(
     request: LiveRequest, tell: Callable[[str], None], show: Callable[[str], None]
 ) -> LiveSummary:
@@ -162,7 +81,7 @@ def run_live(
     HostError
         In one line: no device, a busy port, a wrong file, a missing extra.
     """
-    _check(request)
+    check_request(request)
     tell = _unfailing(tell)
     calibration = load_calibration(request.calibration)
     source = request.opened or open_source(request, tell)
@@ -182,7 +101,7 @@ def run_live(
         if bridge is not None:
             session.audiences.append(bridge)
         if request.json:
-            session.audiences.append(_JsonLines(show))
+            session.audiences.append(JsonLines(show))
         known = own or request.calibration is not None
         estimates = _estimates(request, session, calibration.text if known else "")
         watch = _test_points(request, session, calibration)
@@ -407,7 +326,7 @@ async def _page(
         raise UsageError(
             f"the page needs {error.name}: {install_hint(error.name)}; or --no-page"
         ) from None
-    listener = _listener(request)
+    listener = listening_socket(request.port, lan=request.lan)
     port = listener.getsockname()[1]
     guard = PageGuard(port, tuple(own_addresses()) if request.lan else ())
     server = PageServer(session, guard)
@@ -422,57 +341,3 @@ async def _page(
     tell(f"Google Earth: http://127.0.0.1:{port}/live.kml?token={guard.viewer_token}")
     tell("Ctrl-C ends")
     return runner
-
-
-def _listener(request: LiveRequest) -> socket.socket:
-    """Return a listening socket: of the port asked for, else of the first free one from 8050."""
-    host = "0.0.0.0" if request.lan else "127.0.0.1"
-    ports = [request.port] if request.port is not None else range(PORT, PORT + _TRIES)
-    for port in ports:
-        listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        if hasattr(socket, "SO_EXCLUSIVEADDRUSE"):  # Windows: nobody else may take it too
-            listener.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
-        else:
-            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            listener.bind((host, port))
-        except OSError:
-            listener.close()
-            continue
-        return listener
-    raise DeviceError(
-        f"{host}: port {ports[0]} is taken, by another `host live`?; name another with --port"
-    )
-
-
-def own_addresses() -> list[str]:
-    """Return the addresses of this computer in its networks; asks nobody."""
-    found = []
-    with contextlib.suppress(OSError):
-        found += socket.gethostbyname_ex(socket.gethostname())[2]
-    with contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.connect(("192.0.2.1", 9))  # sends nothing: it only picks a way out
-        found.append(str(probe.getsockname()[0]))
-    return sorted({one for one in found if not one.startswith("127.")})
-
-
-class _JsonLines(Audience):
-    """The state, one line of JSON a second; each verdict of a test point a line at once."""
-
-    def __init__(self, show: Callable[[str], None]) -> None:
-        self._show = show
-        self._last = self._verdict = 0
-
-    def rows(self, message: bytes) -> None:
-        """Not shown."""
-
-    def state(self, message: str) -> None:
-        """Show new verdicts, and every fifth state: five come in a second."""
-        self._last += 1
-        said = json.loads(message)
-        for verdict in said.get("test_point", {}).get("verdicts", []):
-            if verdict["number"] > self._verdict:
-                self._verdict = verdict["number"]
-                self._show(json.dumps({"type": "verdict"} | verdict))
-        if self._last % 5 == 1:
-            self._show(json.dumps(said))

@@ -19,7 +19,7 @@ import numpy as np
 from host.aircraft.file import Aircraft
 from host.arrays import Array
 from host.planning.aircraft_response import AircraftResponse, deviations
-from host.planning.card_planning import mode_widths_s
+from host.planning.card_design import mode_widths_s
 from host.planning.optimal_card import limited_points
 from host.planning.wanted_input import wanted_surfaces
 from host.twin.testcard.cards import Card, Segment, length_s

@@ -21,13 +21,8 @@ from host.aircraft.prior.prior_table import PriorError
 from host.aircraft.trim import solve
 from host.arrays import IntArray
 from host.constants import NORMAL_95
-from host.planning.card_planning import (
-    TARGET_EXCURSIONS,
-    Point,
-    exact,
-    mode_widths_s,
-    point_of,
-)
+from host.planning.card_design import TARGET_EXCURSIONS, mode_widths_s
+from host.planning.card_planning import Point, exact, point_of
 from host.planning.prior_range import random_aircraft, with_prior
 from host.planning.tone_design import phases, powers, relative_variances
 from host.planning.tone_information import BLOCKS, ToneTable, tone_table
@@ -231,7 +226,7 @@ def _peak(harmonic: IntArray, amplitude: Array, turns: Array) -> float:
 def standard_card(aircraft: Aircraft, airspeed_mps: float = 0.0, repeat: int = 1) -> Card:
     """Return the card that is beaten: a 3-2-1-1 on each axis within the same excursions.
 
-    Widths are those of `card_planning.design`, by the modes of the nominal aircraft; amplitudes
+    Widths are those of `card_design.design`, by the modes of the nominal aircraft; amplitudes
     keep the excursions on the same drawn aircraft.
     """
     speed = airspeed_mps or aircraft.scalar("trim.airspeed_mps")

@@ -13,7 +13,8 @@ from typing import Any
 from host.aircraft.linear_aircraft import load
 from host.export.toml import dumps
 from host.link.serial import BAUD
-from host.live.live_program import LiveRequest, LiveSummary, run_live
+from host.live.live_program import LiveSummary, run_live
+from host.live.live_request import LiveRequest
 from host.live.live_session import LiveSession
 from host.physical.calibration import Calibration
 from host.preflight.check import Check, State

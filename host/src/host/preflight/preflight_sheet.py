@@ -13,7 +13,7 @@ from host.errors import UsageError
 from host.export.atomic_files import atomic_write
 from host.export.toml import dumps
 from host.files.user_text import parse_toml, read_text, read_toml
-from host.live.live_program import Join
+from host.live.live_request import Join
 from host.live.live_session import LiveSession
 from host.physical.calibration import Calibration
 from host.preflight.guided_list import Preflight

@@ -85,7 +85,8 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Receive until Ctrl-C."""
     from host.errors import ExitCode
-    from host.live.live_program import LiveRequest, run_live
+    from host.live.live_program import run_live
+    from host.live.live_request import LiveRequest
     from host.live.output_lines import OutputLines
 
     request = LiveRequest(

@@ -61,7 +61,7 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Walk round the aircraft; return whether it is GO."""
     from host.errors import ExitCode
-    from host.live.live_program import LiveRequest
+    from host.live.live_request import LiveRequest
     from host.preflight.preflight_program import PreflightRequest, run_preflight, typed_line
     from host.preflight.preflight_screen import PreflightScreen
 
