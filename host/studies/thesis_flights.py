@@ -23,7 +23,8 @@ from host.sysid.estimators import fit_equation_error
 from host.sysid.models import LinearModel, Maneuver, free_model
 from host.sysid.pipeline import at_hand, identify_columns
 from host.thesis.error_figures import thesis_program_error_percent, thesis_sum_of_mean_errors
-from host.thesis.hopfield import SWEEPS, free_run, line_search, network
+from host.thesis.hopfield import network
+from host.thesis.original_program import SWEEPS, free_run, line_search
 from host.twin.virtual import VirtualFlight, virtual_flight
 
 FIRST_SEED = 500

@@ -23,13 +23,11 @@ from host.thesis.hopfield import (
     RECORDED,
     RHO,
     STEP_S,
-    SWEEPS,
-    free_run,
     iterate,
     largest_stable_gain,
-    line_search,
     network,
 )
+from host.thesis.original_program import SWEEPS, free_run, line_search
 
 from studies.aircraft import INPUTS, STATES, TABLE_31_A
 from studies.inputs import SHAPES

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from host.readers.even_grid import even_columns
 from host.sysid.models import Maneuver, free_model
-from host.thesis.hopfield import free_run
+from host.thesis.original_program import free_run
 from host.twin.virtual import VirtualFlight, virtual_flight
 from studies.coefficients import CoefficientTally, true_delays, truths
 from studies.flights import PRINCIPAL

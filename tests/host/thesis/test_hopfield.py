@@ -11,9 +11,9 @@ from host.thesis.hopfield import (
     RHO,
     STEP_S,
     largest_stable_gain,
-    line_search,
     network,
 )
+from host.thesis.original_program import line_search
 from studies.aircraft import navion_free
 from studies.data import with_rates
 

@@ -10,7 +10,8 @@ from host.errors import IdentificationError
 from host.sysid import fit
 from host.sysid.estimators import read_options
 from host.sysid.estimators.method_options import check_options, options_of
-from host.thesis.hopfield import line_search, network
+from host.thesis.hopfield import network
+from host.thesis.original_program import line_search
 from studies.aircraft import navion_free
 from studies.data import with_rates
 
