@@ -111,7 +111,7 @@ def dense_log_density(problem: FilterProblem, theta: np.ndarray) -> float:
     return float(stats.multivariate_normal.logpdf(measured, *dense_moments(problem, theta)))
 
 
-@pytest.mark.parametrize("kind", ["each fifth", "at random"])
+@pytest.mark.parametrize("kind", ["each fifth", "at random", "all"])
 def test_the_likelihood_is_that_of_the_joint_normal(kind: str) -> None:
     problem, theta = problem_of(kind)
     shifted = theta + 0.1

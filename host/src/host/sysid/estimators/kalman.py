@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from host.arrays import Array
+from host.arrays import Array, BoolArray
 from host.errors import IdentificationError
 from host.sysid.estimators.start_values import start_values_of
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.kalman_step import corrected, predicted
+from host.sysid.numerics.kalman_filter import filter_with, filter_without_slopes, predicted
 from host.sysid.numerics.output_error_problem import check_shapes
 from host.sysid.numerics.sampled_model import Sampler
 
@@ -286,25 +287,77 @@ def _bias_variance(model: LinearModel, maneuver: Maneuver, k: int) -> float:
     return float(np.var(np.diff(series)) / maneuver.dt_s**2 + np.mean(series**2)) + 1e-12
 
 
+def filtered(
+    run: Callable[..., bool],
+    kind: object,
+    joint: Array,
+    P: Array,
+    variance: Array,
+    maneuver: Maneuver,
+    bounds: tuple[Array, Array] | None = None,
+) -> tuple[Array, Array]:
+    """Filter one maneuver; return innovations, in units and whitened, (samples, p).
+
+    The arguments are those of `filter_without_slopes`; `joint` and `P` end behind the last sample.
+
+    Raises
+    ------
+    IdentificationError
+        If the filter diverges.
+    """
+    found = filter_without_slopes(
+        run, kind, joint, P, variance, maneuver.outputs, maneuver.seen, bounds=bounds
+    )
+    if found is None:
+        raise IdentificationError(
+            f"{maneuver.name}: the Kalman filter diverged; give better start values"
+        )
+    e, independent, deviation = found
+    return e, independent / deviation
+
+
 def _extended_pass(
     filter_: JointFilter, maneuver: Maneuver, joint: Array, P: Array
 ) -> tuple[Array, Array, Array, Array]:
-    n, size = filter_.n_states, len(joint)
     sampler = Sampler(replace(filter_.model, initial_states=()))
-    variance, power = np.diag(filter_.R), np.zeros(size)
-    power[:n] = filter_.process**2 * maneuver.dt_s
-    e, white = np.zeros_like(maneuver.outputs), np.zeros_like(maneuver.outputs)
-    for k, drive in enumerate(sampler.drive(maneuver)):
-        read, by_read = sampler.reading(np.append(joint[n:], 0.0))
-        z = np.concatenate([joint[:n], drive])
-        e[k] = maneuver.outputs[k] - read @ z
-        H = np.hstack([read[:, :n], np.einsum("jcq,c->jq", by_read, z)])
-        joint, P, white[k] = corrected(joint, P, H, e[k], variance)
-        one = sampler.at(np.append(joint[n:], 0.0), maneuver.dt_s)
-        z = np.concatenate([joint[:n], drive])
-        F = np.eye(size)
-        F[:n, :n] = one.step[:, :n]
-        F[:n, n:] = np.einsum("icq,c->iq", one.by_step, z)
-        joint[:n] = one.step @ z
-        P = predicted(P, F, power)
+    power = np.zeros(len(joint))
+    power[: filter_.n_states] = filter_.process**2 * maneuver.dt_s
+    kind = _JointModel(sampler, sampler.drive(maneuver), maneuver.dt_s, power)
+    e, white = filtered(_filter_joint, kind, joint, P, np.diag(filter_.R).copy(), maneuver)
     return joint, P, e, white
+
+
+class _JointModel(NamedTuple):
+    """A linear model over one sample, its parameters states: what the filter takes."""
+
+    sampler: Sampler
+    drive: Array
+    dt_s: float
+    power: Array  # of the process noise of a sample
+
+
+def _joint_outputs(
+    kind: _JointModel, k: int, seen: BoolArray, joint: Array, by_x: Array, y: Array, by_y: Array,
+    H: Array, by_H: Array,
+) -> None:  # fmt: skip
+    n = len(kind.sampler.first)
+    read, by_read = kind.sampler.reading(np.append(joint[n:], 0.0))
+    z = np.concatenate([joint[:n], kind.drive[k]])
+    y[:] = read @ z
+    H[:, :n], H[:, n:] = read[:, :n], np.einsum("jcq,c->jq", by_read, z)
+
+
+def _joint_step(
+    kind: _JointModel, k: int, joint: Array, by_x: Array, P: Array, P_slopes: Array
+) -> bool:
+    n = len(kind.sampler.first)
+    one = kind.sampler.at(np.append(joint[n:], 0.0), kind.dt_s)
+    z = np.concatenate([joint[:n], kind.drive[k]])
+    F = np.eye(len(joint))
+    F[:n, :n], F[:n, n:] = one.step[:, :n], np.einsum("icq,c->iq", one.by_step, z)
+    joint[:n] = one.step @ z
+    P[:] = predicted(P, F, kind.power)
+    return bool(np.isfinite(joint).all())
+
+
+_filter_joint = filter_with(_joint_outputs, _joint_step)

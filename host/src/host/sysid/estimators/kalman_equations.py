@@ -8,20 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
-from host.errors import IdentificationError
 from host.sysid.estimators.kalman import (
     INITIAL_RELATIVE_SD,
     PASSES,
     PROCESS_SHARE,
     change_by_priors,
     filter_result,
+    filtered,
     noise_deviation,
 )
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
-from host.sysid.numerics.equation_filter import filter_equations
-from host.sysid.numerics.nonlinear_problem import NonlinearProblem, finite
+from host.sysid.numerics.equation_filter import EquationModel, filter_equations
+from host.sysid.numerics.nonlinear_problem import NonlinearProblem
 
 # More where parameters still move: a servo of 60 rad/s guessed at 12 stood 25 to 44 % low after two
 # passes, known to 10 to 16, and a stiffness of its equation 9 to 23 %.
@@ -208,23 +208,33 @@ def _passed(
     """Filter one maneuver; `z` and `P` end behind its last sample."""
     maneuver, model = problem.maneuvers[number], problem.nonlinear
     given = problem.given(number, problem.first_guess())
-    n = len(model.states)
+    n, late = len(model.states), [int(k) for k in layout.delay]
     no_limit = np.full(n, np.inf)
-    late = [int(k) for k in layout.delay]
-    leader = np.array([late.index(k) for k in late], dtype=np.int64)
-    e, white, power = (np.empty(maneuver.outputs.shape) for _ in range(3))
-    lower, upper = (
-        np.concatenate(x) for x in ((-no_limit, layout.lower), (no_limit, layout.upper))
+    bounds = (
+        np.concatenate([-no_limit, layout.lower]),
+        np.concatenate([no_limit, layout.upper]),
     )
-    if not finite(
-        model.source.code.loop(filter_equations), z, P, lower, upper, intensity, variance,
-        given.inputs, given.held, given.shift, maneuver.outputs, maneuver.seen,
-        given.parameters, layout.column, problem.constants, problem.tables,
-        np.zeros(n), layout.bias, np.zeros(len(late)), layout.offset,
-        np.zeros(len(late)), layout.delay, leader, layout.input_delay,
-        maneuver.dt_s, problem.substeps, problem.ramp, e, white, power,
-    ) or not np.isfinite(z).all():  # fmt: skip
-        raise IdentificationError(
-            f"{maneuver.name}: the Kalman filter diverged; give better start values"
-        )
-    return e, white / np.sqrt(power)
+    equations = EquationModel(
+        intensity=intensity,
+        inputs=given.inputs,
+        held=given.held,
+        late=given.shift,
+        p=given.parameters,
+        column=layout.column,
+        c=problem.constants,
+        t=problem.tables,
+        bias=np.zeros(n),
+        bias_column=layout.bias,
+        offset=np.zeros(len(late)),
+        offset_column=layout.offset,
+        delay_s=np.zeros(len(late)),
+        delay_column=layout.delay,
+        leader=np.array([late.index(k) for k in late], dtype=np.int64),
+        input_column=layout.input_delay,
+        dt_s=maneuver.dt_s,
+        substeps=problem.substeps,
+        ramp=problem.ramp,
+    )
+    return filtered(
+        model.source.code.loop(filter_equations), equations, z, P, variance, maneuver, bounds
+    )

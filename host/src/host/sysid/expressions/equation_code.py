@@ -122,6 +122,7 @@ class EquationCode:
         self._parts = {
             name: Kernel(f, reordered=False, part=True) for name, f in self.functions.items()
         }
+        self._marked: dict[str, Kernel[..., Any]] = {}  # one each: else each caller compiles it
 
     def loop(self, template: Callable[..., Any]) -> Kernel[..., Any]:
         """Return a kernel from a function that calls those of `FUNCTIONS` by their names.
@@ -137,9 +138,13 @@ class EquationCode:
         code = template.__code__.replace(co_filename=str(self.path))
         known = template.__globals__
         marked = [name for name in code.co_names if hasattr(known.get(name), "of_equations")]
-        parts = {name: self._bound(known[name], part=True) for name in marked}
-        places = {**known, **self._parts, **parts}
+        places = {**known, **self._parts, **{name: self._part(known[name]) for name in marked}}
         bound = FunctionType(code, places, template.__name__)
         bound.__module__ = self.path.stem
         bound.__qualname__ = template.__name__
         return Kernel(bound, reordered=False, part=part)
+
+    def _part(self, function: Callable[..., Any]) -> Kernel[..., Any]:
+        if function.__name__ not in self._marked:
+            self._marked[function.__name__] = self._bound(function, part=True)
+        return self._marked[function.__name__]

@@ -21,7 +21,7 @@ from host.extras import install_hint
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.equation_filter import filter_equations
+from host.sysid.numerics.equation_filter import EquationModel, filter_equations
 from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.innovation_problem import (
     Filtered,
@@ -30,7 +30,8 @@ from host.sysid.numerics.innovation_problem import (
     InnovationSlopes,
 )
 from host.sysid.numerics.intermittent_filter import SequentialInnovations
-from host.sysid.numerics.nonlinear_problem import Given, NonlinearProblem, finite
+from host.sysid.numerics.kalman_filter import filter_without_slopes
+from host.sysid.numerics.nonlinear_problem import Given, NonlinearProblem
 from host.sysid.numerics.process_noise import air_states, steady_covariance
 
 STEP_BOUNDS = 1e-4  # of a bound: differences
@@ -135,24 +136,38 @@ class EquationFilterProblem(InnovationProblem):
         intensity, variance = self.noise(theta)
         if not (np.isfinite(intensity).all() and np.isfinite(variance).all()):
             return None
-        inputs = g.inputs.shape[1]
-        none = np.full(max(n, outputs, inputs), -1, dtype=np.int64)
-        e, white, power = (np.empty(maneuver.outputs.shape) for _ in range(3))
+        none = np.full(max(n, outputs, len(g.shift), len(g.parameters)), -1, dtype=np.int64)
         delay_s = np.array([0.0 if k < 0 else theta[k] for k in self._late])
-        no_limit = np.full(n, np.inf)
-        if not finite(
-            self._run, g.start.copy(), self._first_covariance(g, intensity), -no_limit, no_limit,
-            intensity, variance, g.inputs, g.held, g.shift, maneuver.outputs, maneuver.seen,
-            g.parameters, np.full(len(g.parameters), -1, dtype=np.int64), problem.constants,
-            problem.tables, g.bias, none[:n], problem.output_offsets(g.local), none[:outputs],
-            delay_s, none[:outputs], self._leader, none[:inputs], maneuver.dt_s,
-            self._substeps(maneuver.dt_s), problem.ramp, e, white, power,
-        ):  # fmt: skip
+        equations = EquationModel(
+            intensity=intensity,
+            inputs=g.inputs,
+            held=g.held,
+            late=g.shift,
+            p=g.parameters,
+            column=none[: len(g.parameters)],
+            c=problem.constants,
+            t=problem.tables,
+            bias=g.bias,
+            bias_column=none[:n],
+            offset=problem.output_offsets(g.local),
+            offset_column=none[:outputs],
+            delay_s=delay_s,
+            delay_column=none[:outputs],
+            leader=self._leader,
+            input_column=none[: len(g.shift)],
+            dt_s=maneuver.dt_s,
+            substeps=self._substeps(maneuver.dt_s),
+            ramp=problem.ramp,
+        )
+        x, P = g.start.copy(), self._first_covariance(g, intensity)
+        run = filter_without_slopes(
+            self._run, equations, x, P, variance, maneuver.outputs, maneuver.seen
+        )
+        if run is None:
             return None
-        if not (np.isfinite(e).all() and np.isfinite(white).all()):
-            return None
+        e, independent, deviation = run
         no_slopes = np.zeros((*e.shape, 0))
-        return SequentialInnovations(e, white, power, no_slopes, no_slopes)
+        return SequentialInnovations(e, independent, deviation**2, no_slopes, no_slopes)
 
     def _first_covariance(self, g: Given, intensity: Array) -> Array:
         """Return the covariance of the states at the first sample: of air without a start."""

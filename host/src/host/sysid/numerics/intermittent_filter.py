@@ -1,17 +1,13 @@
-"""A Kalman filter of a linear model whose outputs are measured at some of the samples only.
+"""The Kalman filter of a linear model whose outputs are measured at some of the samples only.
 
-An output that was not measured is left out of the measurement update, and the gain follows what
-was, whatever the pattern (Durbin & Koopman, Time Series Analysis by State Space Methods, 2nd ed.,
-sec. 4.10; Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 5). Outputs of an instant
-are taken one after another, which for uncorrelated noise is the same as all at once, and leaves
-innovations that are independent of each other (Anderson & Moore, Optimal Filtering, 1979, sec.
-6.4). Slopes by the unknowns run along. First come those that the covariance depends on, `shared` of
-them, the noise of each output last; then those of the states alone.
+Its matrices are constant and exact; slopes by the unknowns run along (Jategaonkar, Flight Vehicle
+System Identification, 2nd ed., ch. 5).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,6 +15,7 @@ from host.arrays import Array, BoolArray, IntArray
 from host.compiled import compiled, compiled_part
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.numerics.innovation_problem import InnovationSlopes
+from host.sysid.numerics.kalman_filter import filter_with
 from host.sysid.numerics.recursion import STATE_LIMIT
 from host.sysid.numerics.sampled_model import SampledModel
 
@@ -77,6 +74,18 @@ class SequentialInnovations:
     by_independent: Array
     by_variance: Array
 
+    @classmethod
+    def unfilled(cls, samples: int, outputs: int, total: int, shared: int) -> SequentialInnovations:
+        """Return those of nothing measured, for a filter to write into."""
+        size = samples, outputs
+        return cls(
+            e=np.zeros(size),
+            independent=np.zeros(size),
+            variance=np.ones(size),
+            by_independent=np.zeros((*size, total)),
+            by_variance=np.zeros((*size, shared)),
+        )
+
     @property
     def white(self) -> Array:
         """Innovations of unit variance, (samples, p)."""
@@ -119,108 +128,81 @@ def filter_intermittent(
     maneuver : Maneuver
         Its outputs, and at which samples each was measured.
     """
-    q, s, measured = equations, equations.model, maneuver.outputs
-    size = measured.shape
-    found = SequentialInnovations(
-        e=np.zeros(size),
-        independent=np.zeros(size),
-        variance=np.ones(size),
-        by_independent=np.zeros((*size, s.by_start.shape[1])),
-        by_variance=np.zeros((*size, q.P_slopes.shape[2])),
-    )
+    q, s = equations, equations.model
+    n, shared = len(q.P), q.P_slopes.shape[2]
+    samples, outputs = maneuver.outputs.shape
+    total = s.by_start.shape[1]
+    found = SequentialInnovations.unfilled(samples, outputs, total, shared)
+    no_limit = np.full(n, np.inf)
+    H, by_H = (np.ascontiguousarray(x[:, :n]) for x in (s.read, s.by_read))
     done = _filter(
-        s.step, s.by_step, s.read, s.by_read, q.Q, q.Q_slopes, q.variance, s.start.copy(),
-        s.by_start.copy(), q.P.copy(), q.P_slopes.copy(), drive, measured,
-        maneuver.seen, found.e, found.independent, found.variance,
-        found.by_independent, found.by_variance,
+        ConstantModel(s.step, s.by_step, s.read, s.by_read, q.Q, q.Q_slopes, drive),
+        s.start.copy(), s.by_start.copy(), q.P.copy(), q.P_slopes.copy(), H, by_H,
+        -no_limit, no_limit, q.variance, maneuver.outputs, maneuver.seen, found.by_independent,
+        found.by_variance, found.e, found.independent, found.variance,
     )  # fmt: skip
     return found if done and np.isfinite(found.cost) else None
 
 
-@compiled_part
-def innovation_variance(
-    P: Array,
-    P_slopes: Array,
-    h: Array,
-    by_h: Array,
-    variance: float,
-    noise: int,
-    Ph: Array,
-    by_Ph: Array,
-    by_spread: Array,
-) -> float:
-    """Return the variance h' P h + `variance` of an output's innovation.
+class ConstantModel(NamedTuple):
+    """A `SampledModel`, its process noise and what drives it: what the filter takes."""
 
-    `h` (n,) and `by_h` (n, L) are its row of C; column `noise` is the logarithm of its deviation.
-    Overwritten are `Ph` (n,) by P h, `by_Ph` (n, shared) by its slopes, and `by_spread` (shared,)
-    by slopes of the variance over itself.
-    """
-    n, shared = len(P), P_slopes.shape[2]
-    spread = variance
-    for a in range(n):
-        Ph[a] = 0.0
-        for b in range(n):
-            Ph[a] += P[a, b] * h[b]
-        spread += h[a] * Ph[a]
-    if not spread > 0.0:
-        return spread
-    for q in range(shared):
-        by_spread[q] = 0.0
-    for a in range(n):
-        for q in range(shared):
-            by_Ph[a, q] = 0.0
-        for b in range(n):
-            for q in range(shared):
-                by_Ph[a, q] += P_slopes[a, b, q] * h[b] + P[a, b] * by_h[b, q]
-        for q in range(shared):
-            by_spread[q] += h[a] * by_Ph[a, q] + by_h[a, q] * Ph[a]
-    if shared:
-        by_spread[noise] += 2.0 * variance
-    for q in range(shared):
-        by_spread[q] /= spread
-    return spread
+    step: Array
+    by_step: Array
+    read: Array
+    by_read: Array
+    Q: Array
+    Q_slopes: Array
+    drive: Array
 
 
 @compiled_part
-def take_output(
+def constant_outputs(
+    model: ConstantModel,
+    k: int,
+    seen: BoolArray,
     x: Array,
     by_x: Array,
-    P: Array,
-    P_slopes: Array,
-    h: Array,
-    by_h: Array,
-    left: float,
-    by_left: Array,
-    variance: float,
-    noise: int,
-    Ph: Array,
-    by_Ph: Array,
-    by_spread: Array,
-) -> float:
-    """Correct state and covariance by one output; return the variance of its innovation `left`.
+    y: Array,
+    by_y: Array,
+    H: Array,
+    by_H: Array,
+) -> None:
+    """Write outputs as `kalman_filter.outputs_at`; their slopes by the state stand there."""
+    n, total = by_x.shape
+    for j in range(len(y)):
+        if not seen[j]:
+            continue
+        y[j] = 0.0
+        by_y[j] = 0.0
+        for c in range(model.read.shape[1]):
+            value = x[c] if c < n else model.drive[k, c - n]
+            y[j] += model.read[j, c] * value
+            for q in range(total):
+                by_y[j, q] += model.by_read[j, c, q] * value
+                if c < n:
+                    by_y[j, q] += model.read[j, c] * by_x[c, q]
 
-    `by_left` (L,) is overwritten by slopes over the deviation; else as `innovation_variance`.
-    """
-    n, shared = len(x), P_slopes.shape[2]
-    spread = innovation_variance(P, P_slopes, h, by_h, variance, noise, Ph, by_Ph, by_spread)
-    if not spread > 0.0:
-        return spread
-    for a in range(n):
-        gain = Ph[a] / spread
-        x[a] += gain * left
-        for q in range(len(by_left)):
-            by_x[a, q] += gain * by_left[q]
-        for q in range(shared):
-            by_x[a, q] += (by_Ph[a, q] / spread - gain * by_spread[q]) * left
-        for b in range(n):
-            P[a, b] -= gain * Ph[b]
-            for q in range(shared):
-                P_slopes[a, b, q] -= (
-                    gain * by_Ph[b, q] + by_Ph[a, q] * Ph[b] / spread - gain * Ph[b] * by_spread[q]
-                )
-    for q in range(len(by_left)):
-        by_left[q] /= np.sqrt(spread)
-    return spread
+
+@compiled_part
+def constant_step(
+    model: ConstantModel, k: int, x: Array, by_x: Array, P: Array, P_slopes: Array
+) -> bool:
+    """Step as `kalman_filter.step_ahead`."""
+    n, total = by_x.shape
+    before, by_before = x.copy(), by_x.copy()
+    x[:] = 0.0
+    by_x[:] = 0.0
+    for i in range(n):
+        for c in range(model.step.shape[1]):
+            value = before[c] if c < n else model.drive[k, c - n]
+            x[i] += model.step[i, c] * value
+            for q in range(total):
+                by_x[i, q] += model.by_step[i, c, q] * value
+                if c < n:
+                    by_x[i, q] += model.step[i, c] * by_before[c, q]
+    covariance_ahead(P, P_slopes, model.step, model.by_step, model.Q, model.Q_slopes)
+    return bool(np.max(np.abs(x)) < STATE_LIMIT)
 
 
 @compiled_part
@@ -231,11 +213,10 @@ def covariance_ahead(
     by_step: Array,
     Q: Array,
     Q_slopes: Array,
-    G: Array,
-    by_G: Array,
 ) -> None:
-    """Overwrite P and its slopes by F P F' + Q; `G` (n, n) and `by_G` (n, n, shared) are work."""
+    """Overwrite P and its slopes by F P F' + Q."""
     n, shared = len(P), P_slopes.shape[2]
+    G, by_G = np.empty((n, n)), np.empty((n, n, shared))
     # G = P F'; by_G = P_slopes F' / 2 + P by_F': F by_G and its transpose are all.
     for i in range(n):
         for b in range(n):
@@ -258,100 +239,4 @@ def covariance_ahead(
                     P_slopes[a, b, q] += step[a, i] * by_G[i, b, q] + step[b, i] * by_G[i, a, q]
 
 
-@compiled_part
-def state_ahead(x: Array, by_x: Array, step: Array, by_step: Array, z: Array, T: Array) -> None:
-    """Overwrite the state and its slopes by those of the next sample.
-
-    `z` (n + w,) has the drive behind the first n, which are overwritten; `T` (n, L) is work.
-    """
-    n, wide = step.shape
-    for i in range(n):
-        z[i] = x[i]
-        for q in range(T.shape[1]):
-            T[i, q] = by_x[i, q]
-    for i in range(n):
-        x[i] = 0.0
-        for q in range(T.shape[1]):
-            by_x[i, q] = 0.0
-        for c in range(wide):
-            x[i] += step[i, c] * z[c]
-            for q in range(T.shape[1]):
-                by_x[i, q] += by_step[i, c, q] * z[c]
-        for c in range(n):
-            for q in range(T.shape[1]):
-                by_x[i, q] += step[i, c] * T[c, q]
-
-
-@compiled_part
-def output_at(
-    x: Array, by_x: Array, drive: Array, h: Array, by_h: Array, by_innovation: Array
-) -> float:
-    """Return an output; its slopes are taken off those of its innovation, `by_innovation` (L,).
-
-    `h` (n + w,) and `by_h` (n + w, L) are its rows by state and drive.
-    """
-    n, total, y = len(x), len(by_innovation), 0.0
-    for c in range(len(h)):
-        value = x[c] if c < n else drive[c - n]
-        y += h[c] * value
-        for q in range(total):
-            by_innovation[q] -= by_h[c, q] * value
-            if c < n:
-                by_innovation[q] -= h[c] * by_x[c, q]
-    return y
-
-
-@compiled
-def _filter(
-    step: Array,
-    by_step: Array,
-    read: Array,
-    by_read: Array,
-    Q: Array,
-    Q_slopes: Array,
-    variance: Array,
-    x: Array,
-    by_x: Array,
-    P: Array,
-    P_slopes: Array,
-    drive: Array,
-    measured: Array,
-    sampled: BoolArray,
-    e: Array,
-    independent: Array,
-    spread: Array,
-    by_independent: Array,
-    by_spread: Array,
-) -> bool:
-    """Filter one maneuver; return whether every state stayed below `STATE_LIMIT`."""
-    n, wide = step.shape
-    p, total, shared = len(variance), by_x.shape[1], P_slopes.shape[2]
-    z, T = np.zeros(wide), np.zeros((n, total))
-    Ph, by_Ph = np.zeros(n), np.zeros((n, shared))
-    G, by_G = np.zeros((n, n)), np.zeros((n, n, shared))
-    for k in range(len(drive)):
-        for i in range(n):
-            z[i] = x[i]
-            if not abs(x[i]) < STATE_LIMIT:
-                return False
-        z[n:] = drive[k]
-        for j in range(p):
-            if sampled[k, j]:
-                e[k, j] = measured[k, j]
-                for c in range(wide):
-                    e[k, j] -= read[j, c] * z[c]
-        for j in range(p):
-            if not sampled[k, j]:
-                continue
-            by_left = by_independent[k, j]
-            left = measured[k, j] - output_at(x, by_x, z[n:], read[j], by_read[j], by_left)
-            independent[k, j] = left
-            spread[k, j] = take_output(
-                x, by_x, P, P_slopes, read[j, :n], by_read[j, :n], left, by_left, variance[j],
-                shared - p + j, Ph, by_Ph, by_spread[k, j],
-            )  # fmt: skip
-            if not spread[k, j] > 0.0:
-                return False
-        state_ahead(x, by_x, step, by_step, z, T)
-        covariance_ahead(P, P_slopes, step, by_step, Q, Q_slopes, G, by_G)
-    return True
+_filter = compiled(filter_with(constant_outputs, constant_step))

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from host.arrays import Array
-from host.sysid.numerics.kalman_step import corrected, predicted
+from host.arrays import Array, BoolArray
+from host.sysid.numerics.kalman_filter import filter_with, filter_without_slopes, predicted
 
 
 class Step(NamedTuple):
@@ -32,12 +32,15 @@ def smooth(mean: Array, covariance: Array, steps: Sequence[Step]) -> tuple[Array
     steps : sequence of Step
     """
     count, size = len(steps), len(mean)
-    means, spreads = np.empty((count, size)), np.empty((count, size, size))
-    x, P = mean, covariance
-    for k, step in enumerate(steps):
-        x, P, _ = corrected(x, P, step.H, step.seen - step.H @ x, step.sd**2)
-        means[k], spreads[k] = x, P
-        x, P = step.F @ x + step.known, predicted(P, step.F, step.power)
+    rows = max(len(step.seen) for step in steps)
+    seen = np.array([np.arange(rows) < len(step.seen) for step in steps])
+    known = np.zeros(seen.shape)
+    known[seen] = np.concatenate([step.seen / step.sd for step in steps])
+    passed = _Passed(steps, [], [])
+    x, P = mean.copy(), covariance.copy()
+    if filter_without_slopes(_filter, passed, x, P, np.ones(rows), known, seen) is None:
+        raise np.linalg.LinAlgError("the filter before the smoother diverged")
+    means, spreads = np.array([*passed.means, x]), np.array([*passed.spreads, P])
     for k in range(count - 2, -1, -1):
         step = steps[k]
         FP, ahead = step.F @ spreads[k], predicted(spreads[k], step.F, step.power)
@@ -48,3 +51,32 @@ def smooth(mean: Array, covariance: Array, steps: Sequence[Step]) -> tuple[Array
         means[k] += back @ (means[k + 1] - step.F @ means[k] - step.known)
         spreads[k] += back @ (spreads[k + 1] - ahead) @ back.T
     return means, spreads
+
+
+class _Passed(NamedTuple):
+    """Steps, and what the filter found at each sample that it stepped from."""
+
+    steps: Sequence[Step]
+    means: list[Array]
+    spreads: list[Array]
+
+
+def _outputs(
+    passed: _Passed, k: int, seen: BoolArray, x: Array, by_x: Array, y: Array, by_y: Array,
+    H: Array, by_H: Array,
+) -> None:  # fmt: skip
+    """Write measurements in their deviations."""
+    step = passed.steps[k]
+    H[seen] = step.H / step.sd[:, None]
+    y[:] = H @ x
+
+
+def _step(passed: _Passed, k: int, x: Array, by_x: Array, P: Array, P_slopes: Array) -> bool:
+    passed.means.append(x.copy())
+    passed.spreads.append(P.copy())
+    x[:] = passed.steps[k].F @ x + passed.steps[k].known
+    P[:] = predicted(P, passed.steps[k].F, passed.steps[k].power)
+    return True
+
+
+_filter = filter_with(_outputs, _step)
