@@ -2,7 +2,8 @@
 
 Hypothesis draws the same cases, at any speed, every run. A shell that starts a job in the
 background lets it ignore Ctrl-C, and so its children: those that are to end by Ctrl-C would hang.
-The report of a run names the processor time of each case.
+The report of a run names the processor time of each case. One that takes more than `MOST_CPU_S`
+fails, unless it says why it costs more: `@pytest.mark.costs(seconds, "why")`.
 """
 
 import os
@@ -17,7 +18,13 @@ settings.load_profile("house")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+MOST_CPU_S = 10.0  # of a case, what it makes for later ones included
 _BEGUN = pytest.StashKey[float]()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Register the mark of a case that may take more processor time than others."""
+    config.addinivalue_line("markers", "costs(seconds, why): processor time it may take, and why")
 
 
 def _processor_time_s() -> float:
@@ -36,7 +43,15 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Write processor time into the report of the case, which the clock would not show."""
-    if call.when == "teardown":
-        item.user_properties.append(("cpu_s", f"{_processor_time_s() - item.stash[_BEGUN]:.2f}"))
-    return (yield)
+    """Write processor time into the report of the case; fail one that takes too much."""
+    if call.when != "teardown":
+        return (yield)
+    used_s = _processor_time_s() - item.stash[_BEGUN]
+    item.user_properties.append(("cpu_s", f"{used_s:.2f}"))
+    report = yield
+    mark = item.get_closest_marker("costs")
+    most_s = MOST_CPU_S if mark is None else mark.args[0]
+    if report.passed and used_s > most_s:
+        report.outcome = "failed"
+        report.longrepr = f"{used_s:.1f} s of processor time, at most {most_s:.0f} s: make it less"
+    return report

@@ -12,6 +12,7 @@ from tests.answers.stored_input import HERE, sums
 MOST_BYTES = 10_000_000
 
 
+@pytest.mark.costs(20, "an input is a whole record, as users have it")
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_the_answer_is_the_frozen_one(case: Case, request: pytest.FixtureRequest) -> None:
     tolerance = request.config.getoption("--tolerance")

@@ -114,13 +114,15 @@ def test_file_never_closed_is_exit_code_0_and_fails_strict(
     assert summary["losses"]["unproven_bytes"] > 0
 
 
-@pytest.mark.parametrize("verb", ["maneuvers", "identify"])
+@pytest.mark.parametrize("words", [["maneuvers"], ["identify", "--method", "equation-error"]])
 def test_first_line_says_that_the_end_is_not_proven(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], verb: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str]
 ) -> None:
     path = tmp_path / "flight.bin"
     never_closed(path)
-    code = main([verb, str(path)])  # nothing was flown in it: an answer, or one line that says why
+    code = main(
+        [*words, str(path)]
+    )  # nothing was flown in it: an answer, or one line that says why
     said = capsys.readouterr()
     first = (said.out or said.err).splitlines()[0]
     assert "complete as far as blocks reach, " in first, (code, said)

@@ -20,6 +20,7 @@ CARDS = 200
 NONE = np.zeros(0, np.int64)
 
 
+@pytest.mark.costs(60, "compiles the recorder under sanitizers, once for all below")
 def test_cards_drawn_at_random(capsys: pytest.CaptureFixture[str]) -> None:
     """Under sanitizers; other seeds than those of the campaign."""
     tally = Tally()

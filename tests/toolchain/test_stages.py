@@ -85,6 +85,21 @@ def test_a_case_is_listed_with_its_childs_processor_time_and_what_it_shares(
     assert second_s < 0.1
 
 
+@pytest.mark.parametrize(("mark", "code"), [("", 1), ("@pytest.mark.costs(2, 'why')", 0)])
+def test_a_case_beyond_its_processor_time_has_failed(tmp_path: Path, mark: str, code: int) -> None:
+    text = (ROOT / "tests" / "conftest.py").read_text()
+    (tmp_path / "conftest.py").write_text(text.replace("MOST_CPU_S = 10.0", "MOST_CPU_S = 0.2"))
+    (tmp_path / "test_one.py").write_text(
+        f"import pytest, time\n{mark}\ndef test_busy():\n"
+        "    end_s = time.process_time() + 0.4\n"
+        "    while time.process_time() < end_s: pass\n"
+    )
+    command = (sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider")
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == code
+    assert ("s of processor time, at most 0 s" in done.stdout) == bool(code)
+
+
 def test_a_stage_without_its_report_has_failed(runner: ModuleType) -> None:
     stage = runner.Stage("a", "no cases", (python("pass"),), report=True)
     outcome = runner.run(stage, {})

@@ -21,6 +21,7 @@ US = 16
 FRAME = 20_000 * US
 
 
+@pytest.mark.costs(20, "a row is flown by the image, instruction by instruction")
 @pytest.mark.parametrize("flight_elf", TESTED, indirect=True)
 @pytest.mark.parametrize(("rate_hz", "first"), [(100, 1), (200, 6)])
 def test_short_flight_keeps_every_limit(

@@ -18,7 +18,10 @@ ROOT = Path(__file__).resolve().parents[3]
 # What a build reads; the local ini names this clone's core folder by its full path.
 BUILT_FROM = ("firmware", "protocol", "platformio.ini", "platformio.local.ini")
 
-pytestmark = pytest.mark.parametrize("flight_elf", TESTED, indirect=True)
+pytestmark = [
+    pytest.mark.parametrize("flight_elf", TESTED, indirect=True),
+    pytest.mark.costs(20, "an image is built anew"),
+]
 
 RAM_LIMIT_BYTES = 6600
 # 253 952 are there; more than this is a mistake. 10 500 are what a row teaches, with its floats.

@@ -65,6 +65,7 @@ def test_heartbeat_of_the_flight(flight: Flight) -> None:
     assert flight.beats.wrong() == []
 
 
+@pytest.mark.costs(20, "the image boots after a cut at each write")
 def test_next_boot_records_whatever_write_was_cut(
     flight_elf: Path, ground: GroundWrites, tmp_path: Path
 ) -> None:

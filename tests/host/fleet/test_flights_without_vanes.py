@@ -32,6 +32,7 @@ def task(source: Path, models: tuple[str, ...] = DEFAULT_MODELS) -> dict[str, An
     }
 
 
+@pytest.mark.costs(20, "a whole flight, identified by the fleet and by the door")
 def test_a_flight_without_vanes_has_the_coefficients_and_intervals_of_identify(
     tmp_path: Path,
 ) -> None:

@@ -67,6 +67,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory, store: str) -> Twice:
     return Twice(json.loads(first), json.loads(again), told, folder / "out")
 
 
+@pytest.mark.costs(30, "twenty flights by two processes, once for all below")
 def test_a_fleet_of_stored_flights_is_what_was_flown(fleet: Twice) -> None:
     (found,) = fleet.first["types"]
     assert found["aircraft"] == ["N0", "N1", "N2", "N3"]

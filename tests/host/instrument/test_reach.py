@@ -14,6 +14,7 @@ from host.twin.virtual import virtual_flight
 from tests.host.sysid.at_hand import identify_coefficients
 
 NAME = "ultrastick25e"
+TEXT = calibration(load(NAME))
 # Lines of a calibration, the number in them, and a coefficient whose interval it rules.
 LINES = {
     "alpha": (("alpha_a", "alpha_b"), "slope_sigma", "CL_alpha"),
@@ -55,22 +56,35 @@ def scaled(text: str, tables: tuple[str, ...], key: str, factor: float) -> str:
     return "\n".join(lines) + "\n"
 
 
-def test_lines_and_tables_of_a_calibration_move_intervals(
-    columns: dict[str, Array], tmp_path: Path
+GROUPS = {
+    **LINES,
+    **{
+        group: ((table,), "sigma" if table == "thrust_share" else "half_width", coefficient)
+        for group, (table, coefficient) in TABLES.items()
+    },
+}
+
+
+@pytest.fixture(scope="module")
+def usual(columns: dict[str, Array], tmp_path_factory: pytest.TempPathFactory) -> dict[str, float]:
+    return halves(columns, tmp_path_factory.mktemp("usual") / "mine.toml", TEXT)
+
+
+@pytest.mark.parametrize("group", GROUPS)
+def test_a_line_or_table_of_a_calibration_widens_an_interval(
+    group: str, columns: dict[str, Array], usual: dict[str, float], tmp_path: Path
 ) -> None:
-    path = tmp_path / "mine.toml"
-    text = calibration(load(NAME))
-    usual = halves(columns, path, text)
-    for group, (tables, key, coefficient) in LINES.items():
-        wide = halves(columns, path, scaled(text, tables, key, 10.0))
-        assert wide[coefficient] > 1.05 * usual[coefficient], group
-    for group, (table, coefficient) in TABLES.items():
-        key = "sigma" if table == "thrust_share" else "half_width"
-        wide = halves(columns, path, scaled(text, (table,), key, 10.0))
-        assert wide[coefficient] > 1.05 * usual[coefficient], group
-    narrow = text
+    tables, key, coefficient = GROUPS[group]
+    wide = halves(columns, tmp_path / "mine.toml", scaled(TEXT, tables, key, 10.0))
+    assert wide[coefficient] > 1.05 * usual[coefficient]
+
+
+def test_better_lines_of_a_calibration_narrow_intervals(
+    columns: dict[str, Array], usual: dict[str, float], tmp_path: Path
+) -> None:
+    narrow = TEXT
     for tables, key, _ in LINES.values():
         narrow = scaled(narrow, tables, key, 0.1)
-    small = halves(columns, path, narrow)
+    small = halves(columns, tmp_path / "mine.toml", narrow)
     for coefficient in ("CL_alpha", "Cn_beta", "Cm_de"):
         assert small[coefficient] < 0.95 * usual[coefficient], coefficient

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from tests.browser.chromium import PHONE, Chromium
 from tests.browser.served_page import ServedPage, served_page
@@ -105,6 +106,7 @@ def planted(seconds: float) -> bytes:
     return joined(sorted([*parts, *more], key=lambda part: part.t_us))
 
 
+@pytest.mark.costs(60, "a browser draws twelve plots without a graphics card, started once")
 def test_the_page_shows_the_flight_and_asks_nobody_else(tmp_path: Path) -> None:
     (tmp_path / "in.radio").write_bytes(planted(48.0))
     with served_page(tmp_path, "live", "in.radio@4x", "-o", "<b>out.radio", "--json") as live:

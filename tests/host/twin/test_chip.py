@@ -75,6 +75,7 @@ def instants_us(ident: Ident) -> NDArray[np.float64]:
     return np.asarray(ident["t_us"] - 4.0 * ident["imu_age"])
 
 
+@pytest.mark.costs(25, "the image flies ten seconds, instruction by instruction, for all below")
 def test_both_logs_are_whole_and_hold_the_same_samples_in_the_same_order(
     logs: dict[str, FlightLog], pair: tuple[Ident, Ident]
 ) -> None:

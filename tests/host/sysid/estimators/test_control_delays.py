@@ -8,6 +8,7 @@ from host.sysid.estimators.output_error_fit import fit_output_error
 from host.sysid.models import LinearModel, Maneuver, read_model
 from host.sysid.numerics.nonlinear_problem import output_problem
 
+pytestmark = pytest.mark.usefixtures("machine_code")
 TEXT = """\
 kind = "equations"
 inputs = ["elevator_rad"]

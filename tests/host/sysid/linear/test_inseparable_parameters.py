@@ -49,6 +49,7 @@ def _record() -> pd.DataFrame:
     return pd.DataFrame({"t_s": t, "alpha_rad": y[:, 0], "q_radps": y[:, 1], "elevator_rad": u})
 
 
+@pytest.mark.costs(25, "compiles two models of a user")
 @pytest.mark.parametrize("method", ["output-error", "output-error-white"])
 def test_intervals_are_those_without_them(tmp_path: Path, method: str) -> None:
     """The noise beside them had 30 times its variance, and Cm_q 34 % in place of 1 %."""

@@ -1,5 +1,6 @@
 """A pilot who takes over is told from a test input, and accuses no right model."""
 
+import pytest
 from host.arrays import Array
 from host.instrument.instrument_errors import usual_errors
 from host.physical.recording import FOREIGN
@@ -27,6 +28,9 @@ def test_a_pilot_who_takes_over_is_told_from_a_test_input() -> None:
     assert sum(found[False]) >= 0.7 * len(found[False]) >= 4
 
 
+@pytest.mark.costs(
+    20, "a whole flight in which only taking over shows a lag: no shorter one is known"
+)
 def test_what_only_his_taking_over_shows_widens_nothing() -> None:
     """A lag of the aileron was suspected, and L_p known to 36 % where 17 are due."""
     airspeed = usual_errors(FOREIGN).scaled(0.0, "pitot_scale", "pitot_zero_pa", "density_share")
