@@ -71,7 +71,7 @@ hw: ## check schematic, board and mechanics in KiCad and CAD (asks for an apt so
 ideas: setup sitl ## count what a reader must know: files, functions, filters, verdicts and numbers of identification
 	@$(PYTHON) -m tests.ideas $(IDEAS) $(if $(LITERALS),--change $(LITERALS))
 
-mutants: setup ## share of mutants of the deciding files that their unit tests kill (half an hour)
+mutants: setup ## share of mutants of core and drivers that their unit tests kill, 95 % wanted (hours; goes on)
 	@$(PYTHON) -m tests.mutants $(MUTANTS)
 
 fuzz: setup ## random input, guided by coverage: 2000 of each kind (FULL=1: all, an hour or two)

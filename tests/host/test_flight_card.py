@@ -13,7 +13,9 @@ from host.cli import main
 from host.link.card_console import CardConsole, CardError
 from host.wire.card_text import card_lines
 from host.wire.flight_card import (
+    AXIS,
     ROW,
+    WORTH,
     card_bytes,
     card_faults,
     components,
@@ -257,6 +259,25 @@ def test_a_card_with_a_good_hash_and_an_axis_that_is_none_is_refused() -> None:
         (axis + dtype("card_axis").fields["axis"][1], 3, "learned axis 1: axis 3"),  # type: ignore[index]
     ):
         assert says in "; ".join(card_faults(sealed(AXIS_CARD, place, value)))
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf")])
+def test_no_number_of_a_learned_axis_is_none_or_infinite(value: float) -> None:
+    axis: dict[str, object] = {"axis": 1, "harmonic_count": 1, "harmonics": [3]}
+    worth: dict[str, object] = {}
+    for layout, given in ((AXIS, axis), (WORTH, worth)):
+        singles = [
+            name for name in dtype(layout).names or () if dtype(layout)[name].base.kind == "f"
+        ]
+        assert singles
+        for name in singles:
+            changed = {**given, name: value}
+            pair = (changed, worth) if layout == AXIS else (axis, changed)
+            found = card_faults(card_bytes(HEAD, [DOUBLET], [pair], [1]))
+            assert f"learned axis 1: {name} is not finite" in found
+    assert not any(
+        "finite" in x for x in card_faults(card_bytes(HEAD, [DOUBLET], [(axis, worth)], [1]))
+    )
 
 
 def test_no_byte_behind_a_good_hash_is_a_mistake_of_ours() -> None:

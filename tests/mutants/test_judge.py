@@ -38,7 +38,7 @@ TEST_CASE("three more") { CHECK_EQ(unused_by_the_suite(4), 7); }
 @pytest.fixture(scope="module")
 def main_object(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """doctest's own code, which every judge compiles for itself: 2 s each."""
-    target = tmp_path_factory.mktemp("main") / "main-check_main.o"
+    target = tmp_path_factory.mktemp("main") / "check_main.o"
     assert judge.Judge._compile(judge.SUITES / "check_main.cpp", target, judge.MAIN)
     return target
 
@@ -49,7 +49,7 @@ def tree(tmp_path: Path, main_object: Path, monkeypatch: pytest.MonkeyPatch) -> 
     compile_one = judge.Judge._compile
 
     def compiled(source: Path, target: Path, flags: tuple[str, ...]) -> bool:
-        if target.name == main_object.name:
+        if source.name == "check_main.cpp":
             return bool(shutil.copy(main_object, target))
         return compile_one(source, target, flags)
 
@@ -59,8 +59,12 @@ def tree(tmp_path: Path, main_object: Path, monkeypatch: pytest.MonkeyPatch) -> 
     core.mkdir()
     shutil.copy(judge.SUITES / "check_main.cpp", suites)
     (core / "clamp.cpp").write_text(SOURCE)
+    shutil.copy(judge.SUITES / "check.h", suites)
+    here = f"-I{tmp_path}"
+    monkeypatch.setattr(judge, "PLAIN", (here, *judge.PLAIN))
+    monkeypatch.setattr(judge, "SANITIZED", (here, *judge.SANITIZED))
     (suites / "test_clamp" / "test_clamp.cpp").write_text(SUITE)
-    monkeypatch.setattr(judge, "CORE", core)
+    monkeypatch.setattr(judge, "FIRMWARE", tmp_path)
     monkeypatch.setattr(judge, "SUITES", suites)
     return tmp_path
 
@@ -74,7 +78,7 @@ def mutant(before: str, after: str) -> judge.Mutant:
 def test_verdicts(tree: Path) -> None:
     folder = tree / "out"
     folder.mkdir()
-    one = judge.Judge("clamp", ("test_clamp",), folder)
+    one = judge.Judge("core/clamp.cpp", ("test_clamp",), folder)
     seen: dict[str, str] = {}
     changes = {
         "less": ("value > most", "value < most"),
@@ -97,20 +101,55 @@ def test_verdicts(tree: Path) -> None:
     }
 
 
+HEADER = """\
+#pragma once
+#include <stdint.h>
+inline uint8_t at_most(uint8_t value, uint8_t most) {
+  return value > most ? most : value;
+}
+"""
+
+
+def test_a_header_is_judged_by_the_suite_that_includes_it(tree: Path) -> None:
+    (tree / "drivers").mkdir()
+    (tree / "drivers" / "clamp.h").write_text(HEADER)
+    suite = tree / "suites" / "test_clamp" / "test_clamp.cpp"
+    declared = "uint8_t at_most(uint8_t value, uint8_t most);\n"
+    suite.write_text(SUITE.replace(declared, '#include "drivers/clamp.h"\n'))
+    (folder := tree / "out").mkdir()
+    one = judge.Judge("drivers/clamp.h", ("test_clamp",), folder)
+    changes = {
+        "less": ("value > most", "value < most"),
+        "nonsense": ("value > most", "value >< most"),
+        "or equal": ("value > most", "value >= most"),
+        "wide": ("? most :", "? most + 0 :"),
+    }
+    told = {
+        name: one.verdict(judge.Mutant(HEADER.replace(*change), 1, *change), {})
+        for name, change in changes.items()
+    }
+    assert told == {
+        "less": judge.KILLED,
+        "nonsense": judge.INVALID,
+        "or equal": judge.SAME,
+        "wide": judge.SAME,
+    }
+
+
 def test_a_file_that_fails_its_own_suite_is_refused(tree: Path) -> None:
     (tree / "core" / "clamp.cpp").write_text(SOURCE.replace("value > most", "value < most"))
     folder = tree / "out"
     folder.mkdir()
     with pytest.raises(judge.MutantError, match="its own suite fails"):
-        judge.Judge("clamp", ("test_clamp",), folder)
+        judge.Judge("core/clamp.cpp", ("test_clamp",), folder)
 
 
 def test_a_run_goes_on_and_survivors_are_judged_again_by_a_new_suite(tree: Path) -> None:
-    first = judge.judge_file("clamp", ("test_clamp",), jobs=1, out=tree / "notes")
+    first = judge.judge_file("core/clamp.cpp", ("test_clamp",), jobs=1, out=tree / "notes")
     assert first.count(judge.KILLED) > 3
     assert any("value + 3" in one.was for one in first.survivors)
     suite = tree / "suites" / "test_clamp" / "test_clamp.cpp"
     suite.write_text(SUITE + MORE)
-    second = judge.judge_file("clamp", ("test_clamp",), jobs=1, out=tree / "notes")
+    second = judge.judge_file("core/clamp.cpp", ("test_clamp",), jobs=1, out=tree / "notes")
     assert second.share > first.share
     assert not any("value + 3" in one.was for one in second.survivors)

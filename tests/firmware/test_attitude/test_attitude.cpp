@@ -141,6 +141,15 @@ TEST_CASE("the filter's delay is made up for: a steady roll reads as it is at th
   CHECK(off(static_cast<int16_t>(before - plain.attitude.phi_cdeg()), 28) <= 1);
 }
 
+TEST_CASE("the first sample's rate stands for the time before it, too") {
+  Filter filter;
+  filter.settings.filter_delay_us = 0;
+  filter.in.accel_saturated = true;
+  filter.in.rates[0] = 26200;  // 400 deg/s for 5 ms
+  filter.attitude.step(filter.in, 5000);
+  CHECK(off(filter.attitude.phi_cdeg(), 200) <= 1);
+}
+
 TEST_CASE("a gyro bias is learned in flight, and within seconds at rest") {
   Filter filter;
   filter.run(Attitude::kSettleSteps);
