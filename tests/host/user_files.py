@@ -193,17 +193,17 @@ def use_map(path: Path, rng: random.Random) -> None:
 def use_model(path: Path, rng: random.Random) -> None:
     """As `identify --model` and `simulate --aircraft` do."""
     from host.planning.identified_aircraft import is_model
-    from host.sysid.coefficients import is_coefficient_model, read_coefficient_model
+    from host.sysid.coefficients import CoefficientModel
     from host.sysid.conversion.conversion_table import FlightCondition, convert
     from host.sysid.models import read_model
     from host.sysid.models.model_file import read_trim
 
     del rng
-    if is_coefficient_model(path):
-        list(read_coefficient_model(path).named())
-        return
     is_model(path)
-    model = read_model(path)
+    model = read_model(path, of_coefficients=True)
+    if isinstance(model, CoefficientModel):
+        list(model.named())
+        return
     for matrix in model.matrices(model.start):
         finite(matrix)
     with contextlib.suppress(HostError):

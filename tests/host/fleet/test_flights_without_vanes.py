@@ -11,7 +11,7 @@ from host.constants import NORMAL_95
 from host.errors import IdentificationError
 from host.fleet.flight_task import DEFAULT_MODELS
 from host.fleet.tasks.flight_identification import flight_row
-from host.sysid.coefficients import coefficient_model
+from host.sysid import models
 
 import host
 from tests.host.readers.autopilot_flights import write
@@ -61,6 +61,6 @@ def test_a_flight_without_vanes_has_the_coefficients_and_intervals_of_identify(
 
 def test_a_model_that_was_asked_for_by_name_is_not_replaced(tmp_path: Path) -> None:
     own = tmp_path / "own.toml"
-    own.write_bytes(Path(coefficient_model.__file__).with_name("standard.toml").read_bytes())
+    own.write_bytes(Path(str(models.__file__)).with_name("standard_coefficients.toml").read_bytes())
     with pytest.raises(IdentificationError, match="coefficients need the columns alpha_rad"):
         flight_row(task(write("ulog", tmp_path), (str(own),)))

@@ -19,14 +19,14 @@ from host.readers.even_grid import even_columns
 from host.sysid.coefficients import (
     CoefficientFit,
     CoefficientModel,
-    read_coefficient_model,
     standard_model,
 )
 from host.sysid.coefficients.coefficient_fit import Derivative
-from host.sysid.coefficients.coefficient_model import parse_term
 from host.sysid.coefficients.coefficient_search import fit_coefficients
 from host.sysid.coefficients.trim_derivatives import TrimMeans, derivatives_at_trim
 from host.sysid.coefficients.window_spectra import Window
+from host.sysid.models import read_model
+from host.sysid.models.coefficient_model import parse_term
 from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight
 
@@ -50,6 +50,12 @@ def written(
     document = {"kind": "coefficients", "name": "own", "rows": dict(rows), "beside": dict(beside)}
     path.write_text(tomlout.dumps(document))
     return path
+
+
+def read_terms(path: Path) -> CoefficientModel:
+    model = read_model(path, of_coefficients=True)
+    assert isinstance(model, CoefficientModel)
+    return model
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +105,7 @@ def test_recovers_the_bend_of_a_moment_and_of_the_polar(
         "Cm": ["alpha", "q_hat", "de", "alpha^2", "q*alpha", "V"],
         "CD": ["CL^2", "q", "de"],
     }
-    model = read_coefficient_model(written(tmp_path, rows, {"CD": ["de^2"]}))
+    model = read_terms(written(tmp_path, rows, {"CD": ["de^2"]}))
     fit = fitted(bent, model)
     found = by_name(fit)
     for name, truth, within in (
@@ -131,7 +137,7 @@ def test_body_axes_say_the_same_as_lift_and_drag_turned(
     fits = []
     for forces in (("CL", "CD"), ("CZ", "CX")):
         rows, beside = dict.fromkeys(forces, normal) | moments, dict.fromkeys(forces, bends)
-        model = read_coefficient_model(written(tmp_path, rows, beside))
+        model = read_terms(written(tmp_path, rows, beside))
         fits.append(by_name(fitted(bent, model)))
     wind, body = fits
     for name in ("CL_alpha", "CL_q", "CL_de", "CD_alpha", "CD_de", "CD_0"):
@@ -143,9 +149,7 @@ def test_body_axes_say_the_same_as_lift_and_drag_turned(
 
 def test_turning_is_the_slope_of_turned_forces(tmp_path: Path) -> None:
     moments = {k: v for k, v in ROWS.items() if k not in ("CL", "CD")}
-    model = read_coefficient_model(
-        written(tmp_path, {"CZ": ["alpha"], "CX": ["alpha"]} | moments, {})
-    )
+    model = read_terms(written(tmp_path, {"CZ": ["alpha"], "CX": ["alpha"]} | moments, {}))
     position = {name: k for k, (name, _, _) in enumerate(model.named())}
     trim, lift, drag = 0.08, 0.4, 0.05
     z, x = (
@@ -166,7 +170,7 @@ def test_turning_is_the_slope_of_turned_forces(tmp_path: Path) -> None:
 
 
 def test_the_standard_equations_are_a_file(tmp_path: Path) -> None:
-    assert read_coefficient_model(written(tmp_path, ROWS)).equations == standard_model().equations
+    assert read_terms(written(tmp_path, ROWS)).equations == standard_model().equations
     assert standard_model().nuisance == {"CD_alpha2", "CD_alpha_de", "CD_de2"}
 
 
@@ -201,7 +205,7 @@ def test_what_is_wrong_with_a_file_is_one_line(
     rows: dict[str, list[str]], said: str, tmp_path: Path
 ) -> None:
     with pytest.raises(IdentificationError) as caught:
-        read_coefficient_model(written(tmp_path, ROWS | rows))
+        read_terms(written(tmp_path, ROWS | rows))
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -217,10 +221,12 @@ def test_the_command_names_what_is_wrong(
 ) -> None:
     table = tmp_path / "flight.csv"
     table.write_text("t_s,alpha_rad\n" + "".join(f"{0.02 * k:.2f},0.1\n" for k in range(200)))
-    own = written(tmp_path, ROWS | {"Cm": ["alpha", "gamma"]})
+    wrong = written(tmp_path, ROWS | {"Cm": ["alpha", "gamma"]})
+    (tmp_path / "right").mkdir()
+    right = written(tmp_path / "right", ROWS)
     for models, said in (
-        ([str(own)], "unknown term 'gamma'"),
-        (["coefficients", str(own)], "several models of the coefficients; give one at a time"),
+        ([str(wrong)], "unknown term 'gamma'"),
+        (["coefficients", str(right)], "several models of the coefficients; give one at a time"),
     ):
         flags = [x for model in models for x in ("--model", model)]
         assert main(["identify", str(table), "--aircraft", NAME, *flags]) == 2

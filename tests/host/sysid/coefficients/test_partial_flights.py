@@ -13,7 +13,8 @@ from host.aircraft.propulsion import propeller
 from host.errors import IdentificationError
 from host.physical.recording import SURFACES
 from host.readers.even_grid import even_columns
-from host.sysid.coefficients import read_coefficient_model
+from host.sysid.coefficients import CoefficientModel
+from host.sysid.models import read_model
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
 
@@ -125,7 +126,8 @@ def test_a_model_of_lift_and_pitch(
     path.write_text(
         'kind = "coefficients"\n[rows]\nCL = ["alpha", "q", "de"]\nCm = ["alpha", "q", "de"]\n'
     )
-    assert set(read_coefficient_model(path).equations) == {"CL", "Cm"}
+    model = read_model(path, of_coefficients=True)
+    assert isinstance(model, CoefficientModel) and set(model.equations) == {"CL", "Cm"}
     part = identified(table, models=path)
     assert rows(part) == {"CL", "Cm"}
     agrees(part, whole, LIFT_AND_PITCH)

@@ -279,3 +279,18 @@ def test_numbers_of_numpy_are_written_as_numbers(tmp_path: Path) -> None:
     assert {p.name: p for p in again.parameters} == named
     assert len(again.accelerometer_offsets) == len(accelerometer_offsets) > 0
     assert (again.delays, again.accelerometer_offsets) == (delays, accelerometer_offsets)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('kind = "coefficients"\nrows.Cm = ["alpha"]', "terms of coefficients, expected matrices"),
+        ('rows.Cm = ["alpha"]', 'write kind = "coefficients" above'),
+        ('rates.q_radps = "-q_radps"', 'write kind = "equations" above'),
+    ],
+)
+def test_a_file_of_another_kind_says_which(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(text)
+    with pytest.raises(IdentificationError, match=said):
+        read_model(path)

@@ -13,7 +13,7 @@ from host.sysid.answer.linear_rules import percent
 from host.sysid.answer.marks import Judged, mark_of, share_text
 from host.sysid.checks.data_finding import Feedback, Finding
 from host.sysid.coefficients.coefficient_fit import FLAG_SHARE
-from host.sysid.coefficients.coefficient_model import standard_model
+from host.sysid.models.model_file import standard_model
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer

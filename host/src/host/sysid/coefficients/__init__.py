@@ -9,19 +9,13 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
     from host.sysid.coefficients.coefficient_fit import CoefficientFit
-    from host.sysid.coefficients.coefficient_model import (
-        CoefficientModel,
-        is_coefficient_model,
-        read_coefficient_model,
-        standard_model,
-    )
+    from host.sysid.models.coefficient_model import CoefficientModel
+    from host.sysid.models.model_file import standard_model
 
 __all__ = [
     "CoefficientAnswer",
     "CoefficientFit",
     "CoefficientModel",
-    "is_coefficient_model",
-    "read_coefficient_model",
     "standard_model",
 ]
 
@@ -30,9 +24,7 @@ __getattr__ = lazily(
     {
         "CoefficientAnswer": "coefficient_estimator",
         "CoefficientFit": "coefficient_fit",
-        "CoefficientModel": "coefficient_model",
-        "is_coefficient_model": "coefficient_model",
-        "read_coefficient_model": "coefficient_model",
-        "standard_model": "coefficient_model",
+        "CoefficientModel": "coefficient_search",
+        "standard_model": "coefficient_search",
     },
 )

@@ -15,7 +15,7 @@ from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array, IntArray
 from host.constants import GRAVITY_MPS2
-from host.sysid.coefficients.coefficient_model import CoefficientModel
+from host.sysid.models.coefficient_model import CoefficientModel
 from host.sysid.reconstruction.inverse_sensor_model import Record
 
 # Roll in elevator maneuvers: lift beside a CG off the plane of symmetry, its only clear trace.

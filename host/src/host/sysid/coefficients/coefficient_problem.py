@@ -17,7 +17,6 @@ from host.arrays import Array, IntArray
 from host.constants import GRAVITY_MPS2
 from host.instrument.deviations import SensorErrorModel
 from host.sysid.coefficients.aero_equations import KINEMATIC, Equation, FlightHistory, equations
-from host.sysid.coefficients.coefficient_model import CoefficientModel
 from host.sysid.coefficients.slow_gusts import LENGTH_M
 from host.sysid.coefficients.window_spectra import (
     EquationKey,
@@ -26,6 +25,7 @@ from host.sysid.coefficients.window_spectra import (
     equation_spectra,
     window_transform,
 )
+from host.sysid.models.coefficient_model import CoefficientModel
 from host.sysid.reconstruction.inverse_sensor_model import (
     Record,
     Spectrum,

@@ -29,7 +29,6 @@ from host.sysid.coefficients.coefficient_intervals import (
     intervals,
     validation,
 )
-from host.sysid.coefficients.coefficient_model import CoefficientModel, standard_model
 from host.sysid.coefficients.coefficient_problem import (
     EquationData,
     FlightProblem,
@@ -50,6 +49,8 @@ from host.sysid.coefficients.normal_equations import Prior, solve_normal_equatio
 from host.sysid.coefficients.slow_gusts import gust_information, gust_regressors, gust_strength
 from host.sysid.coefficients.trim_derivatives import DerivativesAtTrim
 from host.sysid.coefficients.window_spectra import ResidualSpectra, Window, residual_spectra
+from host.sysid.models.coefficient_model import CoefficientModel
+from host.sysid.models.model_file import standard_model
 from host.sysid.reconstruction.inverse_sensor_model import decimate, usable_length
 
 # Rounds with the coefficients alone, then with sensor errors and slow gusts.

@@ -16,8 +16,8 @@ from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.errors import IdentificationError
 from host.sysid.aerodynamics.measured_thrust import thrust_column
-from host.sysid.coefficients.coefficient_model import DRAG, CoefficientModel
 from host.sysid.coefficients.window_spectra import Window
+from host.sysid.models.coefficient_model import DRAG, CoefficientModel
 
 SIDE = ("CY", "Cl", "Cn")
 STANDARD_DENSITY, DENSITY_SHARE = 1.225, 0.05  # kg/m3; up to 1000 m, 0 to 30 degrees C

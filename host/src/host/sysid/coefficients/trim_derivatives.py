@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.coefficients.coefficient_model import BODY, CoefficientModel
+from host.sysid.models.coefficient_model import BODY, CoefficientModel
 
 POLAR = "CD_CL2"
 

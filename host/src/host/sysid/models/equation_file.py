@@ -34,11 +34,10 @@ import re
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 from host.errors import IdentificationError
 from host.files.quantities import Quantity
-from host.files.user_text import parse_toml, read_text, shown
+from host.files.user_text import shown
 from host.sysid.expressions.equation_code import EquationNodes
 from host.sysid.expressions.grammar import NAME, RESERVED
 from host.sysid.models.file_parts import delays_from, names_from, parameter_from, table_from
@@ -65,22 +64,6 @@ _PLACE = re.compile(r"\[?(\w+)\]?(?:\.(\w+))?")
 _HEADING = re.compile(r"\s*\[+\s*(\w+(?:\.\w+)?)\s*\]")
 _KEY = re.compile(r"\s*[\"']?(\w+)[\"']?\s*=")
 _ANY = Quantity("", -1e12, 1e12, "a Young's modulus is smaller")
-
-
-def read_equations(path: Path) -> NonlinearModel:
-    """Read a file of equations.
-
-    Raises
-    ------
-    IdentificationError
-        In one line: file, line, key, column of the expression and what is wrong.
-    """
-    text = read_text(path, IdentificationError, "TOML")
-    document = parse_toml(text, str(path), IdentificationError)
-    try:
-        return equations_from(document, path.stem)
-    except IdentificationError as error:
-        raise IdentificationError(f"{path}{_line_of(str(error), text)}: {error}") from None
 
 
 def equations_from(document: Mapping[str, object], name: str = "model") -> NonlinearModel:
@@ -306,7 +289,7 @@ def _refuse_twice(named: Mapping[str, Collection[str]]) -> None:
             seen[name] = kind
 
 
-def _line_of(message: str, text: str) -> str:
+def line_of(message: str, text: str) -> str:
     """Return the line of the key that a message begins with, as `` line 12``; else nothing."""
     found = _PLACE.match(message)
     if found is None:

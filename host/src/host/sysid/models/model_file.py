@@ -31,21 +31,29 @@ a parameter, `output_biases` those of outputs that are no state: records hold to
 without a constant of its own the trim would pass for a derivative. `delays` are those of vanes,
 IMU, attitude and pitot, with the priors of the templates. An empty list frees none. Constants that
 are known, or the same in all records, and known noise: `model_constants.py`.
+
+`kind = "equations"` says that a file holds a user's equations (`equation_file.py`), and
+`kind = "coefficients"` the terms of lift, drag, side force and moments (`coefficient_model.py`).
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
+from typing import Literal, overload
 
 import numpy as np
 
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.files.quantities import Quantity
-from host.files.user_text import shown
-from host.sysid.models.equation_file import KIND, read_equations
+from host.files.user_text import parse_toml, read_text, shown
+from host.sysid.models.coefficient_model import KIND as COEFFICIENTS
+from host.sysid.models.coefficient_model import CoefficientModel, coefficients_from
+from host.sysid.models.equation_file import KIND as EQUATIONS
+from host.sysid.models.equation_file import equations_from, line_of
 from host.sysid.models.file_parts import (
     delays_from,
     names_from,
@@ -89,20 +97,50 @@ _TRIM = {
 MOST_SIGNALS = 30  # both axes together have 8 states and 14 outputs
 
 
-def read_model(path: Path) -> LinearModel:
-    """Read a model file.
+@overload
+def read_model(path: Path) -> LinearModel: ...
+@overload
+def read_model(path: Path, *, of_coefficients: Literal[True]) -> LinearModel | CoefficientModel: ...
+def read_model(path: Path, *, of_coefficients: bool = False) -> LinearModel | CoefficientModel:
+    """Read a model file: matrices, or by its `kind` equations or terms of coefficients.
+
+    Parameters
+    ----------
+    path : Path
+    of_coefficients : bool
+        Whether terms of coefficients are a model here too.
 
     Raises
     ------
     IdentificationError
         If the file is no TOML or no model; the line says where.
     """
-    document = read_document(path)
-    if document.get("kind") == KIND:
-        return read_equations(path)
-    if "rates" in document:
-        raise IdentificationError(f'{path}: [rates] are of equations; write kind = "{KIND}" above')
+    text = read_text(path, IdentificationError, "TOML")
+    document = parse_toml(text, str(path), IdentificationError)
+    kind = document.get("kind")
+    if kind == COEFFICIENTS and of_coefficients:
+        return coefficients_from(document, str(path))
+    if kind == COEFFICIENTS:
+        raise IdentificationError(f"{path}: terms of coefficients, expected matrices or equations")
+    if kind == EQUATIONS:
+        try:
+            return equations_from(document, path.stem)
+        except IdentificationError as error:
+            raise IdentificationError(f"{path}{line_of(str(error), text)}: {error}") from None
+    for key, meant in (("rates", EQUATIONS), ("rows", COEFFICIENTS)):
+        if key in document:
+            raise IdentificationError(
+                f'{path}: [{key}] are of {meant}; write kind = "{meant}" above'
+            )
     return model_from(document, str(path))
+
+
+@cache
+def standard_model() -> CoefficientModel:
+    """Return the terms of coefficients that are used when none are given."""
+    model = read_model(Path(__file__).with_name("standard_coefficients.toml"), of_coefficients=True)
+    assert isinstance(model, CoefficientModel)
+    return model
 
 
 def read_trim(path: Path) -> Trim:

@@ -8,22 +8,17 @@ from pathlib import Path
 
 from host.errors import IdentificationError
 from host.near_names import like
-from host.sysid.coefficients.coefficient_model import (
-    CoefficientModel,
-    is_coefficient_model,
-    read_coefficient_model,
-    standard_model,
-)
 from host.sysid.estimators.method_registry import all_methods, find_method
 from host.sysid.estimators.method_registry import methods as single_methods
 from host.sysid.linear.linear_model import AXIS_OF, DEFAULT_METHOD, STAGED
-from host.sysid.models.model_file import read_model
+from host.sysid.models.coefficient_model import KIND, CoefficientModel
+from host.sysid.models.model_file import read_model, standard_model
 from host.sysid.models.named_models import model_path, shipped_files, shipped_lines
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
 from host.sysid.models.thrust_column import THRUST_COLUMNS
 from host.sysid.pipeline.arguments import listed
 
-COEFFICIENTS = "coefficients"
+COEFFICIENTS = KIND  # the name of the standard ones
 DEFAULT_MODELS = ("longitudinal", "lateral")
 # What stands in the place of a default model, and why.
 WITHOUT_AIRSPEED = (
@@ -86,23 +81,27 @@ def requested_models(given: ModelName | Iterable[ModelName] | None) -> Models:
     """
     names = listed(given) or list(DEFAULT_MODELS)
     linear: list[tuple[str, LinearModel | None]] = []
-    terms: list[CoefficientModel | Path | str] = []
+    terms: list[CoefficientModel] = []
     for name in names:
         if isinstance(name, LinearModel):
             linear.append((name.name, name))
-        elif isinstance(name, CoefficientModel) or name == COEFFICIENTS:
+        elif isinstance(name, CoefficientModel):
             terms.append(name)
+        elif name == COEFFICIENTS:
+            terms.append(standard_model())
         elif not isinstance(name, str | Path):
             raise IdentificationError(
                 f"a model is of type {type(name).__name__}, expected a name, a path, a LinearModel"
                 " or a CoefficientModel"
             )
-        elif is_coefficient_model(Path(name)):
-            terms.append(Path(name))
         elif name in AXIS_OF:
             linear.append((str(name), None))
         elif (str(name) and Path(name).exists()) or str(name).lower().endswith(".toml"):
-            linear.append((str(name), read_model(Path(name))))
+            read = read_model(Path(name), of_coefficients=True)
+            if isinstance(read, CoefficientModel):
+                terms.append(read)
+            else:
+                linear.append((str(name), read))
         elif str(name) in shipped_files():
             linear.append((str(name), read_model(model_path(name))))
         else:
@@ -111,11 +110,12 @@ def requested_models(given: ModelName | Iterable[ModelName] | None) -> Models:
                 f" there are {', '.join(AXIS_OF)}, coefficients, those of the thesis (`--model"
                 " list`), or a TOML file"
             )
-    if len([t for t in terms if t != COEFFICIENTS]) + (COEFFICIENTS in terms) > 1:
+    standard = standard_model() if COEFFICIENTS in names else None
+    if len([t for t in terms if t is not standard]) + (standard is not None) > 1:
         raise IdentificationError(
             "argument models names several models of the coefficients; give one at a time"
         )
-    return Models(tuple(linear), _terms(terms[0]) if terms else None, bool(listed(given)))
+    return Models(tuple(linear), terms[0] if terms else None, bool(listed(given)))
 
 
 def possible_models(asked: Models, columns: Sequence[Collection[str]]) -> tuple[Models, list[str]]:
@@ -149,12 +149,6 @@ def _wanting(columns: Sequence[Collection[str]]) -> Iterator[tuple[dict[str, str
         yield WITHOUT_PITCH
     if any("r_radps" in c and "phi_rad" not in c for c in columns):
         yield WITHOUT_BANK
-
-
-def _terms(given: CoefficientModel | Path | str) -> CoefficientModel:
-    if isinstance(given, CoefficientModel):
-        return given
-    return standard_model() if given == COEFFICIENTS else read_coefficient_model(Path(given))
 
 
 def known_methods() -> dict[str, str]:

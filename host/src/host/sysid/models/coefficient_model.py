@@ -1,6 +1,6 @@
 """Model structure: the terms of each force and moment coefficient, read from TOML.
 
-`standard.toml` has the equations used when nothing is given, and the syntax of a term.
+`standard_coefficients.toml` has the equations used when nothing is given, and the syntax of a term.
 """
 
 from __future__ import annotations
@@ -9,14 +9,12 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.sysid.models.toml_document import read_document
 
 SIGNALS = ("alpha", "beta", "p", "q", "r", "de", "da", "dr", "V")
 LIFT = "CL"  # as a regressor: of the drag polar
@@ -93,70 +91,45 @@ class CoefficientModel:
                 yield f"{equation}_{term.label}", equation, term
 
 
-@cache
-def standard_model() -> CoefficientModel:
-    """Return the equations used when none are given."""
-    return read_coefficient_model(Path(__file__).with_name("standard.toml"))
-
-
-def is_coefficient_model(path: Path) -> bool:
-    """Return whether a TOML file is of this kind, by its own key."""
-    try:
-        return bool(read_document(path).get("kind") == KIND)
-    except IdentificationError:
-        return False  # the reader of the file reports what is wrong
-
-
-def read_coefficient_model(path: Path) -> CoefficientModel:
-    """Read the terms of every coefficient.
-
-    Parameters
-    ----------
-    path : Path
-        TOML; its tables ``[rows]`` and ``[beside]`` are terms reported and nuisance terms.
-
-    Parameters
-    ----------
-    path : Path
-        TOML; its tables ``[rows]`` and ``[beside]`` are terms reported and nuisance terms.
+def coefficients_from(document: Mapping[str, object], source: str) -> CoefficientModel:
+    """Build a model from a parsed document: ``[rows]`` are reported, ``[beside]`` nuisance terms.
 
     Raises
     ------
     IdentificationError
-        If it is not TOML, an equation is absent or unknown, a term is unknown or doubled.
+        If an equation is absent or unknown, a term is unknown or doubled.
     """
-    document = read_document(path)
     unknown = sorted(set(document) - set(KEYS))
     if unknown:
         raise IdentificationError(
-            f"{path}: unknown key {', '.join(unknown)}; known are {', '.join(KEYS)}"
+            f"{source}: unknown key {', '.join(unknown)}; known are {', '.join(KEYS)}"
         )
-    reported, nuisance = (_lists(document.get(key, {}), f"{path}: [{key}]") for key in KEYS[2:])
+    reported, nuisance = (_lists(document.get(key, {}), f"{source}: [{key}]") for key in KEYS[2:])
     forces = BODY if set(BODY) & set(reported) else WIND
     expected = (*forces, *MOMENTS_AND_SIDE)
     for row in (*reported, *nuisance):
         if row not in expected:
             raise IdentificationError(
-                f"{path}: unknown row {row}; a model has CL and CD or CZ and CX, and"
+                f"{source}: unknown row {row}; a model has CL and CD or CZ and CX, and"
                 f" {', '.join(MOMENTS_AND_SIDE)}"
             )
     fitted = [row for row in expected if reported.get(row)]
     nuisance_only = [row for row in nuisance if row not in fitted]
     if not fitted or nuisance_only:
         raise IdentificationError(
-            f"{path}: no terms for {', '.join(nuisance_only or expected)};"
+            f"{source}: no terms for {', '.join(nuisance_only or expected)};"
             " [rows] needs one row or more"
         )
     equations, not_reported = {}, set()
     for row in fitted:
         texts = [*reported[row], *nuisance.get(row, ())]
-        terms = tuple(parse_term(text, row, f"{path}: {row}") for text in texts)
+        terms = tuple(parse_term(text, row, f"{source}: {row}") for text in texts)
         for term, count in Counter(terms).items():
             if count > 1:
-                raise IdentificationError(f"{path}: {row}: {term.label} stands there twice")
+                raise IdentificationError(f"{source}: {row}: {term.label} stands there twice")
         equations[row] = terms
         not_reported |= {f"{row}_{term.label}" for term in terms[len(reported[row]) :]}
-    name = str(document.get("name", path.stem))
+    name = str(document.get("name", Path(source).stem))
     return CoefficientModel(name, equations, frozenset(not_reported))
 
 
