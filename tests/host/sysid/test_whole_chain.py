@@ -14,6 +14,7 @@ from host.errors import IdentificationError
 from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
 from host.sysid.flight import read_columns
+from host.sysid.linear import Answer
 from host.sysid.maneuvers.maneuver_detection import detect_maneuvers, grade
 from host.sysid.models import Trim, read_model
 from host.sysid.models.templates import longitudinal
@@ -79,12 +80,16 @@ def test_a_sweep_is_found_from_its_first_slow_swing() -> None:
     assert found[0].input_end_s == pytest.approx(33.0, abs=0.3)
 
 
-def test_main_derivatives_and_modes_are_near_the_truth(
-    flown: tuple[Path, dict[str, Any]],
-) -> None:
+@pytest.fixture(scope="module")
+def answers(flown: tuple[Path, dict[str, Any]]) -> dict[str, Answer]:
     """Light turbulence, every tolerance drawn, nominal mass properties."""
     columns, _ = read_columns(flown[0])
-    answers = {a.template: a for a in identify(columns, airframe=airframe_data("ultrastick25e"))}
+    return {a.template: a for a in identify(columns, airframe=airframe_data("ultrastick25e"))}
+
+
+def test_main_derivatives_and_modes_are_near_the_truth(
+    flown: tuple[Path, dict[str, Any]], answers: dict[str, Answer]
+) -> None:
     truth = flown[1]["maneuver"]
     assert isinstance(truth, list)
     for template, axis, names in (
@@ -103,9 +108,8 @@ def test_main_derivatives_and_modes_are_near_the_truth(
     assert answers["lateral"].held_out
 
 
-def test_unseen_maneuvers_are_predicted(flown: tuple[Path, dict[str, Any]]) -> None:
-    columns, _ = read_columns(flown[0])
-    for answer in identify(columns, airframe=airframe_data("ultrastick25e")):
+def test_unseen_maneuvers_are_predicted(answers: dict[str, Answer]) -> None:
+    for answer in answers.values():
         fitted = {f.name: f.nrmse for f in answer.fits}
         unseen = {f.name: f.nrmse for f in answer.validation}
         assert set(unseen) == set(fitted) == set(answer.model.outputs)

@@ -6,7 +6,7 @@ from host.sysid import fit
 from host.sysid.numerics.ar_noise import choose_order, fit_ar, lagged_moments, stabilise
 from scipy import signal
 from studies.aircraft import navion_structured
-from studies.coverage import NOISES, coloured_noise, run_case
+from studies.coverage import NOISES, coloured_noise
 from studies.data import noisy
 
 pytestmark = pytest.mark.usefixtures("machine_code")
@@ -56,24 +56,6 @@ def test_given_back_moments_remove_the_bias_of_residuals() -> None:
 def test_poles_are_kept_inside_the_circle() -> None:
     inside = stabilise(np.array([2.5, -1.4]))
     assert np.max(np.abs(np.roots(np.concatenate([[1.0], -inside])))) < 1.0
-
-
-def test_white_records_mostly_get_no_memory() -> None:
-    orders = [
-        fit("output-error", navion_structured(), [noisy(500 + seed)]).details["noise_orders"]
-        for seed in range(20)
-    ]
-    assert np.mean(np.asarray(orders) == 0.0) > 0.9
-
-
-def test_default_intervals_cover_coloured_noise_and_the_white_ones_do_not() -> None:
-    case = run_case("AR(1) 0.9", 20.0, 80)
-    assert case.failed == 0
-    # 720 correlated outcomes: two standard deviations are about 3 points.
-    assert 0.91 < case.pooled < 0.98
-    assert np.median(case.width_ratio) < 1.15
-    # The deliberate fault: intervals that take coloured residuals for white ones.
-    assert float(np.mean(case.white_covered)) < 0.75
 
 
 def test_the_standard_correction_stays_short_of_the_default() -> None:

@@ -10,7 +10,6 @@ from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.restricted_likelihood import restricted_slopes
 
 DT_S, RECORD_S, RECORDS = 0.02, 2.5, 8
-N_R = -2.4
 L_P, LAG, L_DA, GUST, GYRO_RADPS = -16.0, 5.0, 150.0, 0.5, 0.003
 PROCESS = ("gust_roll_radps",)
 
@@ -118,67 +117,3 @@ def test_noise_that_is_not_there_makes_no_maneuver_disagree() -> None:
     influence = found.details["maneuver_influence"]
     assert isinstance(influence, np.ndarray)
     assert np.max(np.abs(influence[:, :3] / found.standard_error[:3])) < 2.0
-
-
-@pytest.mark.usefixtures("machine_code")
-def test_the_lag_of_rolling_air_is_right_in_short_records() -> None:
-    """Constants of every record take its slow part: the lag was 15 % quick, now 1 % slow."""
-    lags = np.array([_lags(_cut(_flown(seed))) for seed in range(16)]) / LAG - 1.0
-    fitted, restricted = lags.mean(axis=0)
-    assert fitted > 0.1
-    assert abs(restricted) < 0.05
-    assert np.std(lags[:, 1]) < np.std(lags[:, 0])
-
-
-@pytest.mark.usefixtures("machine_code")
-def test_damping_is_right_in_short_records() -> None:
-    """A rate that air alone moves seemed to die away 1.5 times as fast where each record has a bias
-    of its own; what the bias does to the rate, counted as noise, took nothing of that off."""
-    model = replace(
-        _rolling(),
-        states=("r_radps",),
-        outputs=("r_radps",),
-        A=np.zeros((1, 1)),
-        B=np.zeros((1, 1)),
-        C=np.ones((1, 1)),
-        terms=(Term("A", 0, 0, "N_r"),),
-        parameters=(Parameter("N_r", N_R),),
-        state_biases=("r_radps",),
-        initial_states=("r_radps",),
-    )
-    found = np.array(
-        [
-            [
-                fit_filter_error(
-                    model, _yawed(seed), process=("r_radps",), compare_noise=False, restricted=r
-                ).value("N_r")
-                for r in (False, True)
-            ]
-            for seed in range(24)
-        ]
-    )
-    fitted, restricted = found.mean(axis=0) / N_R
-    assert fitted > 1.3
-    assert abs(restricted - 1.0) < 0.15
-
-
-def _yawed(seed: int) -> list[Maneuver]:
-    """Return short records of a yaw rate that air moves."""
-    rng = np.random.default_rng(seed)
-    samples, decay = round(RECORD_S / DT_S), np.exp(N_R * DT_S)
-    kick = GUST * np.sqrt((1.0 - decay**2) / (-2.0 * N_R))
-    r = [GUST / np.sqrt(-2.0 * N_R) * rng.standard_normal()]
-    for _ in range(RECORDS * samples - 1):
-        r.append(decay * r[-1] + kick * rng.standard_normal())
-    measured = np.array(r) + GYRO_RADPS * rng.standard_normal(len(r))
-    return _cut(Maneuver(DT_S, np.zeros((len(r), 1)), measured[:, None]))
-
-
-def _lags(records: list[Maneuver]) -> list[float]:
-    """Return the gust's lag with the constants fitted, and with them integrated out."""
-    return [
-        fit_filter_error(
-            _rolling(), records, process=PROCESS, compare_noise=False, restricted=restricted
-        ).value("lag_radps")
-        for restricted in (False, True)
-    ]

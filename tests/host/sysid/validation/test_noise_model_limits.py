@@ -3,9 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
-from host.sysid.answer.model_agreement import RELIED_ON
 from host.sysid.estimators import fit
 from host.sysid.linear import Answer
 from host.sysid.models import LinearModel, Maneuver, model_from
@@ -14,12 +12,9 @@ from host.sysid.numerics.input_coherence import input_coherence
 from host.sysid.validation.free_simulation import free_responses
 from host.sysid.validation.noise_model_limits import random_errors
 from host.sysid.validation.prediction_limits import power_freedom, predictions, random_noise
-from studies.independent import cells, flown
 from studies.wrong_flights import fly
 
-import host
 from tests.host.sysid.at_hand import identify
-from tests.host.sysid.verdicts import verdict_of
 
 WORDS = "more than the fit's own gusts and noise allow"
 
@@ -42,23 +37,6 @@ def test_a_hidden_lag_is_more_than_its_gusts_allow() -> None:
     [line] = [w for w in answer.result.warnings if WORDS in w]
     assert "intervals widened" in line
     assert "M_de" in line
-
-
-def test_slow_noise_that_passed_for_gusts_may_be_larger_than_gusts_make() -> None:
-    """By what gusts make alone 4 of 11 right derivatives were kept in coloured noise, not all."""
-    answer = gust_filter("none", 21811, "coloured")
-    assert all(one.holds for one in answer.predictions.values())
-
-
-def test_a_right_fit_is_no_failure_where_gusts_move_the_aircraft_more_than_its_inputs() -> None:
-    """In gusts of 1 m/s N_beta, N_r and N_dr were known to 1 to 2 %, right, and not relied on."""
-    air = cells()["karman, fixed, point, 1 m/s"]
-    table = pd.DataFrame({name: np.asarray(column) for name, column in flown(air, 21100).items()})
-    [answer] = host.identify(table, models=("lateral",)).linear
-    [r] = [one for one in answer.fits if one.name == "r_radps"]
-    assert r.nrmse > 0.5
-    marks = verdict_of(answer).marks
-    assert {marks[name] for name in ("N_beta", "N_r", "N_dr")} <= set(RELIED_ON)
 
 
 def slow_roll() -> tuple[LinearModel, Maneuver, np.ndarray]:
