@@ -38,6 +38,7 @@ from host.sysid.coefficients.flight_terms import flight_terms
 from host.sysid.coefficients.hidden_lag import lagging_equations
 from host.sysid.coefficients.pooled_flights import pool_fits
 from host.sysid.coefficients.window_spectra import SHORTEST_S, ResidualSpectra, Window
+from host.sysid.errors.error_list import by_cause
 from host.sysid.flight.reconstructed_flight import (
     ReconstructedFlight,
     maneuver_name,
@@ -52,30 +53,6 @@ NAME = "coefficients"
 LEAD_S = 0.5  # of trim before a maneuver
 SETTLED_S = 3.0  # after the launch
 LONGITUDINAL = (*WIND, *BODY, "Cm")
-ERROR_GROUPS = {
-    "mass": ("mass_share",),
-    "Ixx": ("ixx_share",),
-    "Iyy": ("iyy_share",),
-    "Izz": ("izz_share",),
-    "place of CG and IMU along x": ("cg_x_m", "imu_x_m"),
-    "place of CG and IMU along y": ("cg_y_m", "imu_y_m"),
-    "place of CG and IMU along z": ("cg_z_m", "imu_z_m"),
-    "IMU tilt about x": ("tilt_x_rad",),
-    "IMU tilt and vane zero about y": ("tilt_y_rad", "alpha_zero_rad"),
-    "IMU tilt about z": ("tilt_z_rad",),
-    "vane scale and upwash": ("alpha_scale", "beta_scale", "upwash_share"),
-    "places of the vanes": ("vane_x_m", "vane_z_m"),
-    "pitot": ("pitot_scale", "pitot_drift_pa"),
-    "zeros of the accelerometers": (
-        "accel_x_bias_mps2", "accel_y_bias_mps2", "accel_z_bias_mps2",
-    ),
-    "thrust": ("thrust_share",),
-    "surface pots": ("elevator_scale", "aileron_scale", "rudder_scale"),
-    "servos": (
-        "elevator_servo_scale", "aileron_servo_scale", "rudder_servo_scale", "servo_delay_s",
-    ),
-    "clock": ("clock_share",),
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -325,13 +302,11 @@ def _airborne_samples(columns: Mapping[str, Array], settled_s: float) -> slice:
 def _main_causes(fit: CoefficientFit) -> dict[str, tuple[str, float]]:
     """Return for each coefficient the group of errors that contributes most to its variance."""
     count, names = len(fit.derivatives), list(fit.errors)
-    result = {}
+    result, causes = {}, by_cause(names)
     for k, d in enumerate(fit.derivatives):
         shares = {}
-        for cause, members in ERROR_GROUPS.items():
-            at = [count + names.index(m) for m in members if m in names]
-            if not at:
-                continue
+        for cause, members in causes.items():
+            at = [count + names.index(m) for m in members]
             with_them = fit.covariance[k, at]
             narrowed = with_them @ np.linalg.solve(fit.covariance[np.ix_(at, at)], with_them)
             shares[cause] = float(narrowed / max(fit.covariance[k, k], 1e-300))

@@ -65,8 +65,6 @@ class SearchResult:
     level_slopes : Array, shape (3, errors)
         Derivatives of `mean_levels` by the sensor errors.
     final : FinalStep
-    error_deviations : Array, shape (errors,)
-        Standard deviations of the sensor errors before the flight.
     error_shifts : Array, shape (n, errors)
         Of all unknowns by one standard deviation of each sensor error.
     moved_from_least_squares : Array, shape (coefficients,)
@@ -79,7 +77,6 @@ class SearchResult:
     errors: Array
     level_slopes: Array
     final: FinalStep
-    error_deviations: Array
     error_shifts: Array
     moved_from_least_squares: Array
 
@@ -228,9 +225,7 @@ def coefficient_fit(
         histories=_histories(problem, data, widths.state),
         prediction=predicted,
         maneuver_agreement=widths.maneuver_agreement,
-        error_deviations=dict(
-            zip(problem.error_names, search.error_deviations.tolist(), strict=True)
-        ),
+        error_deviations={source.name: source.deviation for source in problem.sources},
         error_shifts=widths.error_shifts,
     )
 

@@ -25,6 +25,7 @@ from host.sysid.coefficients.window_spectra import (
     equation_spectra,
     window_transform,
 )
+from host.sysid.errors.error_list import ErrorSource
 from host.sysid.models.coefficient_model import CoefficientModel
 from host.sysid.reconstruction.inverse_sensor_model import (
     Record,
@@ -34,8 +35,6 @@ from host.sysid.reconstruction.inverse_sensor_model import (
 )
 
 STEP = 0.3  # of a standard deviation: width of the numeric slopes
-# Errors that change no corrected signal.
-MASS_AND_THRUST = ("mass_share", "ixx_share", "iyy_share", "izz_share", "thrust_share")
 SensorErrorSlopes = dict[EquationKey, Spectrum]
 
 
@@ -88,8 +87,8 @@ class FlightProblem:
     windows : list of WindowTransform
     window_samples : IntArray, shape (m,)
         Samples of all windows.
-    error_names : tuple of str
-        Sensor errors in the order of the unknowns.
+    sources : tuple of ErrorSource
+        Sensor errors in the order of the unknowns, with their deviations before the flight.
     """
 
     model: CoefficientModel
@@ -102,7 +101,17 @@ class FlightProblem:
     airspeed_ratio: tuple[float, float]
     windows: list[WindowTransform]
     window_samples: IntArray
-    error_names: tuple[str, ...]
+    sources: tuple[ErrorSource, ...]
+
+    @property
+    def error_names(self) -> tuple[str, ...]:
+        """Sensor errors in the order of the unknowns."""
+        return tuple(source.name for source in self.sources)
+
+    @property
+    def error_deviations(self) -> Array:
+        """Their standard deviations before the flight, (errors,)."""
+        return np.array([source.deviation for source in self.sources])
 
     @property
     def position(self) -> dict[str, int]:
@@ -185,7 +194,6 @@ def sensor_error_slopes(
     base: EquationData,
     coefficients: Mapping[str, Array],
     errors: Array,
-    sd: Array,
 ) -> tuple[SensorErrorSlopes, Array]:
     """Return the derivatives of residuals and mean levels by every sensor error.
 
@@ -198,8 +206,8 @@ def sensor_error_slopes(
         Its equations at `errors`.
     coefficients : mapping
         By equation.
-    errors, sd : Array, shape (errors,)
-        Sensor errors and their prior standard deviations.
+    errors : Array, shape (errors,)
+        Sensor errors.
 
     Returns
     -------
@@ -209,13 +217,15 @@ def sensor_error_slopes(
         Of `mean_levels`.
     """
     start = {k: v[:, 0] - v[:, 1:] @ coefficients[k[0]] for k, v in base.spectra.items()}
-    slopes = {k: np.zeros((len(v), len(sd)), np.complex128) for k, v in start.items()}
+    count = len(problem.sources)
+    slopes = {k: np.zeros((len(v), count), np.complex128) for k, v in start.items()}
     base_levels = mean_levels(problem, base)
-    level_slopes = np.zeros((len(base_levels), len(sd)))
-    for j, (name, width) in enumerate(zip(problem.error_names, STEP * sd, strict=True)):
+    level_slopes = np.zeros((len(base_levels), count))
+    for j, source in enumerate(problem.sources):
+        width = STEP * source.deviation
         perturbed = errors.copy()
         perturbed[j] += width
-        same = base.signals if name in MASS_AND_THRUST else None
+        same = None if source.kind.changes_data else base.signals
         other = problem.evaluate(record, history, perturbed, coefficients, same)
         level_slopes[:, j] = (mean_levels(problem, other) - base_levels) / width
         for key, spectrum in other.spectra.items():
@@ -231,7 +241,7 @@ def flight_problem(
     airframe: AirframeData,
     sensors: SensorErrorModel,
     powerplant: Powerplant,
-    error_names: tuple[str, ...],
+    sources: tuple[ErrorSource, ...],
 ) -> FlightProblem:
     """Return the problem of a record.
 
@@ -244,10 +254,10 @@ def flight_problem(
     windows : sequence of Window
     airframe, sensors, powerplant
         Of the aircraft file.
-    error_names : tuple of str
-        Sensor errors to estimate.
+    sources : tuple of ErrorSource
+        Sensor errors to estimate or to consider.
     """
-    zero = dict.fromkeys(error_names, 0.0)
+    zero = dict.fromkeys((source.name for source in sources), 0.0)
     samples = [np.flatnonzero((t >= w.first_s) & (t <= w.last_s)) for w in windows]
     window_samples = np.unique(np.concatenate(samples))
     speed = np.sqrt(2.0 * np.maximum(record.columns["qbar_pa"], 1.0) / density(record))
@@ -293,7 +303,7 @@ def flight_problem(
             for inside, window in zip(samples, windows, strict=True)
         ],
         window_samples=window_samples,
-        error_names=error_names,
+        sources=sources,
     )
 
 

@@ -19,7 +19,7 @@ from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.instrument.deviations import SensorErrorModel, deviations
+from host.instrument.deviations import SensorErrorModel
 from host.sysid.coefficients.auxiliary_model import simulate_noise_free
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
 from host.sysid.coefficients.coefficient_intervals import (
@@ -49,21 +49,13 @@ from host.sysid.coefficients.normal_equations import Prior, solve_normal_equatio
 from host.sysid.coefficients.slow_gusts import gust_information, gust_regressors, gust_strength
 from host.sysid.coefficients.trim_derivatives import DerivativesAtTrim
 from host.sysid.coefficients.window_spectra import ResidualSpectra, Window, residual_spectra
+from host.sysid.errors.error_list import CONSIDERED, error_kinds, errors_by_file
 from host.sysid.models.coefficient_model import CoefficientModel
 from host.sysid.models.model_file import standard_model
 from host.sysid.reconstruction.inverse_sensor_model import decimate, usable_length
 
 # Rounds with the coefficients alone, then with sensor errors and slow gusts.
 COEFFICIENT_ROUNDS, JOINT_ROUNDS = 3, 2
-# Consider parameters: not estimated, only in the intervals. A vane's lag of 0.5 ms looks like an
-# arm of 8 mm, and estimating the arm biased CL_de by 15 % and CY_beta by 11 % (simulated flights,
-# seeds 300-303). Pitot and density stay as calibrated too: the flight determines them no better,
-# and estimating them biased CL_alpha by 0.5 % and CD_0 (seeds 900-939). A delay of the servos looks
-# like one of IMU and vanes, and nothing tells the clock alone.
-CONSIDERED = (
-    "cg_x_m", "imu_x_m", "ixx_share", "iyy_share", "izz_share",
-    "pitot_scale", "pitot_drift_pa", "density_share", "servo_delay_s", "clock_share",
-)  # fmt: skip
 FIXED = 1e30  # inverse variance of what is not estimated, or not yet
 COLUMNS = (
     "alpha_rad", "beta_rad", "p_radps", "q_radps", "r_radps", "ax_mps2", "ay_mps2", "az_mps2",
@@ -129,10 +121,9 @@ def search_coefficients(
     t = t[shift : shift + kept]
     record = decimate(cut, float(t[-1] - t[0]) / (kept - 1))
     t = t[0] + np.arange(record.samples) * record.dt_s
-    sd = dict(deviations(sensors, airframe))
-    sd |= {name: max(least, sd[name]) for name, least in (assumed or {}).items()}
-    problem = flight_problem(model, record, t, windows, airframe, sensors, powerplant, tuple(sd))
-    return _search(problem, np.array(list(sd.values())), known_noise or {})
+    sources = errors_by_file(sensors, airframe, assumed)
+    problem = flight_problem(model, record, t, windows, airframe, sensors, powerplant, sources)
+    return _search(problem, known_noise or {})
 
 
 def fit_coefficients(
@@ -174,18 +165,19 @@ class _Iterate:
         return {name: self.theta[at] for name, at in problem.positions.items()}
 
 
-def _search(problem: FlightProblem, sd: Array, known_noise: ResidualSpectra) -> SearchResult:
-    """Run all rounds; `sd` are the prior standard deviations of the sensor errors."""
-    position = problem.position
+def _search(problem: FlightProblem, known_noise: ResidualSpectra) -> SearchResult:
+    """Run all rounds."""
+    position, sd = problem.position, problem.error_deviations
     iterate = _Iterate(
         np.zeros(len(position)), np.zeros(len(sd)), known_noise, ({}, {}),
         np.zeros((3, len(sd))),
     )  # fmt: skip
     known = problem.error_names  # of servos and clock only where the flight has such errors
-    considered = np.array([known.index(n) for n in CONSIDERED if n in known])
+    listed = [n for n, kind in error_kinds().items() if kind.coefficients == CONSIDERED]
+    considered = np.array([known.index(n) for n in listed if n in known])
     by_round: list[Array] = []
     for round_ in range(COEFFICIENT_ROUNDS + JOINT_ROUNDS):
-        data, spectra = _linearise(problem, iterate, sd, round_)
+        data, spectra = _linearise(problem, iterate, round_)
         gusts = sum(values.shape[1] for values in spectra[0].gusts.values())
         unknowns = Unknowns(problem.positions, len(position), gusts, len(sd))
         blocks = equation_blocks(
@@ -221,12 +213,12 @@ def _search(problem: FlightProblem, sd: Array, known_noise: ResidualSpectra) -> 
     if known_noise:
         moved = np.zeros_like(moved)
     return SearchResult(
-        problem, iterate.theta, iterate.errors, iterate.level_slopes, final, sd, shifts, moved
+        problem, iterate.theta, iterate.errors, iterate.level_slopes, final, shifts, moved
     )
 
 
 def _linearise(
-    problem: FlightProblem, iterate: _Iterate, sd: Array, round_: int
+    problem: FlightProblem, iterate: _Iterate, round_: int
 ) -> tuple[EquationData, tuple[EquationSpectra, EquationSpectra]]:
     """Return the equations at the iterate, then spectra of the flight and of the gust-free one."""
     flight = problem.record, problem.history
@@ -247,10 +239,10 @@ def _linearise(
         if round_ == COEFFICIENT_ROUNDS:
             own = iterate.coefficients(problem)
             first, iterate.level_slopes = sensor_error_slopes(
-                problem, *flight, data, own, iterate.errors, sd
+                problem, *flight, data, own, iterate.errors
             )
             second, _ = sensor_error_slopes(
-                problem, *noise_free, noise_free_data, own, iterate.errors, sd
+                problem, *noise_free, noise_free_data, own, iterate.errors
             )
             iterate.slopes = first, second
     return data, (

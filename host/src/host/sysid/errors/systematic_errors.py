@@ -16,6 +16,7 @@ import numpy as np
 from host.aircraft.mass_properties import Condition
 from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate, trim_of
+from host.sysid.errors.error_list import NOT_PAID, ErrorSource, error_sources
 from host.sysid.errors.one_step import one_step_of
 from host.sysid.estimators.gust_penetration import penetration_of, without_gust_penetration
 from host.sysid.models.consider_covariance import consider_covariance
@@ -161,7 +162,10 @@ def _without_each(
     """Yield the data, and through the trim the model, without each uncorrected error."""
     still = _mean_of(cuts)
     flights = {id(c): (c, cut) for c, cut in zip(reversed(known), reversed(cuts), strict=True)}
-    sizes = {key: _open_deviations(*flight) for key, flight in flights.items()}
+    sizes = {
+        key: {source.name: source.deviation for source in errors_left_open(*flight)}
+        for key, flight in flights.items()
+    }
     fresh = is_template(model, trim)
     for error in dict.fromkeys(e for c in known for e in sizes[id(c)]):
         other = [
@@ -179,16 +183,20 @@ def _without_each(
         yield _WithoutOne(error, gains, moved, bent, changed)
 
 
-def _open_deviations(known: Compatibility, columns: Mapping[str, Array]) -> dict[str, float]:
-    """Return one standard deviation of every uncorrected error of a flight, by name."""
-    corrected_error_sd = {
-        e: sd for e, sd in residual_deviations(known).items() if e in INSTANTANEOUS_ERRORS
-    }
-    return {
-        e: sd
-        for e, sd in (corrected_error_sd | residual_errors(known, columns)).items()
-        if sd > 0.0
-    }
+def errors_left_open(known: Compatibility, columns: Mapping[str, Array]) -> tuple[ErrorSource, ...]:
+    """Return the errors that the reconstruction of a flight leaves open, as linear models pay them.
+
+    Parameters
+    ----------
+    known : Compatibility
+        Of the flight.
+    columns : mapping
+        Of a maneuver: the delay of vanes by an aircraft file depends on its airspeed.
+    """
+    left = {e: sd for e, sd in residual_deviations(known).items() if e in INSTANTANEOUS_ERRORS}
+    sizes = left | residual_errors(known, columns)
+    listed = error_sources(sizes, known.instrument)
+    return tuple(e for e in listed if e.deviation > 0.0 and e.kind.linear != NOT_PAID)
 
 
 def _without_one(
