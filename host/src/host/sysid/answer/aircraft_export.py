@@ -70,32 +70,11 @@ def aircraft_document(
         bent = [n for n in known if n.split("_")[1:2] in (["alpha"], ["alpha2"])]
         if condition is not None and any(not n.endswith("_alpha") for n in bent):
             _add_nodes(table, condition.alpha_range_rad)
-        nodes = np.asarray(table["alpha_rad"], dtype=np.float64)
         for c in known.values():
-            axis, _, label = c.name.partition("_")
-            key = f"{AXES.get(axis, axis)}_{CONTROLS.get(label, label)}"
-            if axis not in AXES or key not in table:
-                continue
-            of_alpha = label == "alpha"
-            bend = known.get(f"{axis}_alpha2" if of_alpha else f"{axis}_alpha_{label}")
-            steeper = 0.0 if bend is None else bend.value
-            if of_alpha:
-                base = f"{AXES[axis]}_0"
-                at = found.alpha_rad
-                kept = np.asarray(table[base]) + np.asarray(table[key]) * at
-                there = float(np.interp(at, nodes, kept)) - c.value * at + steeper * at**2
-                table[base] = [there] * len(nodes)
-                origins[base] = f"such that {axis} at the trim stays, after {key} was identified"
-            from_rad = (2.0 if of_alpha else 1.0) * found.alpha_rad
-            table[key] = (c.value + steeper * (nodes - from_rad)).tolist()
-            origins[key] = _origin(found.method, c) + ("" if bend is None else f"; {_said(bend)}")
-            replaced += [c.name] if bend is None else [c.name, bend.name]
+            replaced += _put_slope(table, origins, known, c, found)
         if condition is not None:
             replaced += _put_drag(table, origins, known, condition, found.method)
-        left = [c for n, c in known.items() if n not in replaced and n[:2] not in ("CX", "CZ")]
-        if condition is not None and left:
-            before = [origins["not_carried"]] if "not_carried" in origins else []
-            origins["not_carried"] = "; ".join([*before, *map(_said, left)])
+            _note_rest(origins, known, replaced)
     if not replaced:
         raise IdentificationError("no coefficient is known well enough to make an aircraft of")
     table["sources"] = origins
@@ -103,6 +82,45 @@ def aircraft_document(
     document["name"] = f"{loaded.name}_identified"
     document["title"] = f"{loaded.title}, identified"
     return document, replaced
+
+
+def _put_slope(
+    table: dict[str, Any],
+    origins: dict[str, str],
+    known: Mapping[str, Coefficient],
+    c: Coefficient,
+    found: CoefficientTable,
+) -> list[str]:
+    """Put a derivative, with what it changes by along alpha, in its column; return what was put."""
+    axis, _, label = c.name.partition("_")
+    key = f"{AXES.get(axis, axis)}_{CONTROLS.get(label, label)}"
+    if axis not in AXES or key not in table:
+        return []
+    nodes = np.asarray(table["alpha_rad"], dtype=np.float64)
+    of_alpha = label == "alpha"
+    bend = known.get(f"{axis}_alpha2" if of_alpha else f"{axis}_alpha_{label}")
+    steeper = 0.0 if bend is None else bend.value
+    if of_alpha:
+        base = f"{AXES[axis]}_0"
+        at = found.alpha_rad
+        kept = np.asarray(table[base]) + np.asarray(table[key]) * at
+        there = float(np.interp(at, nodes, kept)) - c.value * at + steeper * at**2
+        table[base] = [there] * len(nodes)
+        origins[base] = f"such that {axis} at the trim stays, after {key} was identified"
+    from_rad = (2.0 if of_alpha else 1.0) * found.alpha_rad
+    table[key] = (c.value + steeper * (nodes - from_rad)).tolist()
+    origins[key] = _origin(found.method, c) + ("" if bend is None else f"; {_said(bend)}")
+    return [c.name] if bend is None else [c.name, bend.name]
+
+
+def _note_rest(
+    origins: dict[str, str], known: Mapping[str, Coefficient], replaced: Sequence[str]
+) -> None:
+    """Name what is known and has no place in the file; forces in body axes are those of CL, CD."""
+    left = [c for n, c in known.items() if n not in replaced and n[:2] not in ("CX", "CZ")]
+    if left:
+        before = [origins["not_carried"]] if "not_carried" in origins else []
+        origins["not_carried"] = "; ".join([*before, *map(_said, left)])
 
 
 def _said(c: Coefficient) -> str:

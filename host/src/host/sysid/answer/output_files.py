@@ -82,34 +82,46 @@ def check_outputs(places: OutputPaths, methods: Sequence[str] | None = None) -> 
         raise _no_history(places.history)
     taken: dict[Path, str] = {}
     for name, path in places.files.items():
-        known, argument = ENDINGS[name], f"argument {name}"
-        if not path.name.lower().endswith(known):
-            raise IdentificationError(
-                f"{argument} {path}: ends in '{path.suffix}', expected {' or '.join(known)}"
-            )
-        check_destination(argument, path, folder=False)
-        for own in files_of(path):
-            if any(own.exists() and g.exists() and own.samefile(g) for g in places.given):
-                raise IdentificationError(
-                    f"{argument} {own} is what the answer is made from; name another file"
-                )
+        _check_file(name, path, places.given)
+        argument = f"argument {name}"
         other = taken.setdefault(path.absolute(), argument)
         if other != argument:
             raise IdentificationError(f"{other} and {argument} both name {path}; name two files")
-    made = [p for p in (places.save_model, places.save_aircraft) if p is not None]
-    whole_ones = [p for p in made if p is places.save_aircraft or _whole(p)]
-    if whole_ones:
-        if not places.source:
-            raise IdentificationError(
-                f"{whole_ones[0]}: an aircraft needs mass and geometry; give argument aircraft"
-            )
-        from host.aircraft import file as aircraft
-
-        aircraft.load(places.source)  # one that was only measured has no tables to put answers in
+    _check_aircraft(places)
     if places.plots is not None:
         check_destination("argument plots", places.plots, folder=True)
         if importlib.util.find_spec("matplotlib") is None:
             raise IdentificationError(f"pictures need matplotlib: {install_hint('matplotlib')}")
+
+
+def _check_file(name: str, path: Path, given: Sequence[Path]) -> None:
+    """Refuse an ending that says nothing, no place, a file that the answer is made from."""
+    known, argument = ENDINGS[name], f"argument {name}"
+    if not path.name.lower().endswith(known):
+        raise IdentificationError(
+            f"{argument} {path}: ends in '{path.suffix}', expected {' or '.join(known)}"
+        )
+    check_destination(argument, path, folder=False)
+    for own in files_of(path):
+        if any(own.exists() and g.exists() and own.samefile(g) for g in given):
+            raise IdentificationError(
+                f"{argument} {own} is what the answer is made from; name another file"
+            )
+
+
+def _check_aircraft(places: OutputPaths) -> None:
+    """Refuse an aircraft to be saved without one that has mass, geometry and tables."""
+    model = places.save_model
+    whole = model if model is not None and _whole(model) else places.save_aircraft
+    if whole is None:
+        return
+    if not places.source:
+        raise IdentificationError(
+            f"{whole}: an aircraft needs mass and geometry; give argument aircraft"
+        )
+    from host.aircraft import file as aircraft
+
+    aircraft.load(places.source)  # one that was only measured has no tables to put answers in
 
 
 def _whole(path: Path) -> bool:
@@ -153,22 +165,10 @@ def write_outputs(
         write_answers(places.mat, answers, direct)
         written.append(places.mat)
     tables = list(direct.tables) if direct else [a.table for a in answers]
-    for path in (places.save_aircraft, places.save_model):
-        # Coefficients alone are an aircraft, not a linear model.
-        plain = path is places.save_model and bool(answers)
-        if path is None or path.suffix.lower() == ".mat":
-            continue
-        if path is places.save_model and form_of(path):
-            condition = direct.fit.condition if direct else None
-            written += write_form(path, tables, answers, places.source, condition)
-            continue
-        if not plain or path.suffix.lower() == ".xml":
-            written.append(_write_aircraft(path, tables, places.source, direct))
-    if places.save_model is not None and places.save_model.suffix.lower() == ".mat":
-        write_answers(places.save_model, answers, direct)
-        written.append(places.save_model)
-    elif places.save_model is not None and places.save_model.suffix.lower() == ".toml":
-        written += _write_models(places.save_model, answers, (*places.given, *written))
+    if places.save_aircraft is not None:
+        written.append(_write_aircraft(places.save_aircraft, tables, places.source, direct))
+    if places.save_model is not None:
+        written += _write_model(places.save_model, places, answers, direct, tables, written)
     if places.history is not None:
         written += _write_histories(places.history, answers, (*places.given, *written))
     if places.plots is not None:
@@ -176,6 +176,29 @@ def write_outputs(
 
         written += save_all(draw_all(answers, direct, verdicts, flights, truth), places.plots)
     return written
+
+
+def _write_model(
+    path: Path,
+    places: OutputPaths,
+    answers: Sequence[Answer],
+    direct: CoefficientAnswer | None,
+    tables: Sequence[CoefficientTable],
+    written: Sequence[Path],
+) -> list[Path]:
+    """Write the model in the format that its ending names.
+
+    Coefficients alone are an aircraft, not a linear model.
+    """
+    if path.suffix.lower() == ".mat":
+        write_answers(path, answers, direct)
+        return [path]
+    if form_of(path):
+        condition = direct.fit.condition if direct else None
+        return write_form(path, tables, answers, places.source, condition)
+    if path.suffix.lower() == ".xml" or not answers:
+        return [_write_aircraft(path, tables, places.source, direct)]
+    return _write_models(path, answers, (*places.given, *written))
 
 
 def _write_aircraft(

@@ -7,7 +7,7 @@ from what is there. Every such step is a remark of the answer.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -77,59 +77,116 @@ def flight_terms(
             "coefficients need a maneuver of the elevator, or one of aileron and rudder, for which"
             " the model has an equation"
         )
-    found, remarks = dict(columns), []
-    along = any(w.longitudinal for w in windows)
-    across = not all(w.longitudinal for w in windows)
-    lost = [n for n in model.equations if not (across if n in SIDE else along)]
-    if lost:
-        which = "the elevator" if across else "aileron and rudder"
-        remarks.append(f"no maneuver of {which}: {', '.join(lost)} left out")
-    zeros = np.zeros(len(columns["t_s"]))
-    unflown = [] if across else [c for c in SIDE_COLUMNS if c not in found]
-    unflown += [] if along else [c for c in PITCH_COLUMNS if c not in found]
-    if unflown:
-        remarks.append(f"taken as zero, for the data have none: {', '.join(unflown)}")
-    found |= dict.fromkeys(unflown, zeros)
-    assumed = _air_assumed(found)
-    level = [c for c in (LEVEL_COLUMNS if not along else ("ax_mps2",)) if c not in found]
-    if level:
-        remarks.append(f"taken as in level flight, for the data have none: {', '.join(level)}")
-        assumed |= {"alpha_zero_rad": LEVEL_SD_RAD} if "alpha_rad" in level else {}
-        found |= _level_flight(found)
-    remarks += _complete_air(found)
-    still = [] if not across else [k for k, c in CONTROLS.items() if _still(found, c, windows)]
-    if still:
-        moved = [c for k, c in CONTROLS.items() if k in still]
-        remarks.append(
-            f"{', '.join(moved)} never moved, or not in the data: its terms are left out"
-        )
-        found |= {c: zeros for c in moved if c not in found}
-    thrust = thrust_column(found, powerplant)
-    remarks += thrust.remarks
-    drag = [n for n in model.equations if n in DRAG and n not in lost]
-    if along and drag and level:
-        lost += drag
-        remarks.append(f"no ax_mps2: {', '.join(drag)} left out")
-    elif not thrust.known:
-        lost += drag
-        if along and drag:
-            remarks.append(
-                f"no thrust known: {', '.join(drag)} left out, the other coefficients hold what"
-                " thrust adds; give [propulsion] and throttle, thrust_n or power_w"
-            )
-    if thrust.thrust_n is not None:
-        found["thrust_n"] = thrust.thrust_n
-    found.setdefault("throttle", zeros)
+    told = _Told(dict(columns), windows)
+    told.leave_axes_out(model)
+    told.fill_air()
+    told.leave_still_controls_out()
+    told.take_thrust(model, powerplant)
     equations = {
-        name: tuple(t for t in terms if not {f[0] for f in t.factors} & set(still))
+        name: tuple(t for t in terms if not {f[0] for f in t.factors} & set(told.still))
         for name, terms in model.equations.items()
-        if name not in lost
+        if name not in told.lost
     }
     if not equations:
-        raise IdentificationError(f"coefficients: {'; '.join(remarks)}; no equation is left")
-    if thrust.assumed_share is not None:
-        assumed["thrust_share"] = thrust.assumed_share
-    return FlightTerms(replace(model, equations=equations), windows, found, tuple(remarks), assumed)
+        raise IdentificationError(f"coefficients: {'; '.join(told.remarks)}; no equation is left")
+    return FlightTerms(
+        replace(model, equations=equations),
+        windows,
+        told.columns,
+        tuple(told.remarks),
+        told.assumed,
+    )
+
+
+@dataclass(slots=True)
+class _Told:
+    """What a flight tells, each step with its remark.
+
+    `lost` are equations, `still` the labels of surfaces that it says nothing of; `level` are the
+    columns taken as in level flight.
+    """
+
+    columns: dict[str, Array]
+    windows: tuple[Window, ...]
+    remarks: list[str] = field(default_factory=list)
+    assumed: dict[str, float] = field(default_factory=dict)
+    lost: list[str] = field(default_factory=list)
+    still: list[str] = field(default_factory=list)
+    level: list[str] = field(default_factory=list)
+
+    @property
+    def along(self) -> bool:
+        """Whether a maneuver of the elevator was flown."""
+        return any(w.longitudinal for w in self.windows)
+
+    @property
+    def across(self) -> bool:
+        """Whether one of aileron or rudder was flown."""
+        return not all(w.longitudinal for w in self.windows)
+
+    @property
+    def zeros(self) -> Array:
+        """A column of what does not move."""
+        return np.zeros(len(self.columns["t_s"]))
+
+    def leave_axes_out(self, model: CoefficientModel) -> None:
+        """Leave out the equations of an axis that was not flown; its columns are zero."""
+        flown = {True: self.across, False: self.along}
+        self.lost = [n for n in model.equations if not flown[n in SIDE]]
+        if self.lost:
+            which = "the elevator" if self.across else "aileron and rudder"
+            self.remarks.append(f"no maneuver of {which}: {', '.join(self.lost)} left out")
+        needless = (() if self.across else SIDE_COLUMNS) + (() if self.along else PITCH_COLUMNS)
+        if unflown := [c for c in needless if c not in self.columns]:
+            self.remarks.append(f"taken as zero, for the data have none: {', '.join(unflown)}")
+        self.columns |= dict.fromkeys(unflown, self.zeros)
+
+    def fill_air(self) -> None:
+        """Add columns of the air: of level flight without the elevator, else from each other."""
+        self.assumed = _air_assumed(self.columns)
+        needed = ("ax_mps2",) if self.along else LEVEL_COLUMNS
+        self.level = [c for c in needed if c not in self.columns]
+        if self.level:
+            which = ", ".join(self.level)
+            self.remarks.append(f"taken as in level flight, for the data have none: {which}")
+            self.columns |= _level_flight(self.columns)
+        if "alpha_rad" in self.level:
+            self.assumed["alpha_zero_rad"] = LEVEL_SD_RAD
+        self.remarks += _complete_air(self.columns)
+
+    def leave_still_controls_out(self) -> None:
+        """Leave out the terms of surfaces that never moved where their axis was flown."""
+        if self.across:
+            moved = CONTROLS.items()
+            self.still = [k for k, c in moved if _still(self.columns, c, self.windows)]
+        if self.still:
+            names = [CONTROLS[k] for k in self.still]
+            self.remarks.append(
+                f"{', '.join(names)} never moved, or not in the data: its terms are left out"
+            )
+            self.columns |= {c: self.zeros for c in names if c not in self.columns}
+
+    def take_thrust(self, model: CoefficientModel, powerplant: Powerplant) -> None:
+        """Add thrust; leave out drag, which nothing tells without it or without `ax_mps2`."""
+        thrust = thrust_column(self.columns, powerplant)
+        self.remarks += thrust.remarks
+        drag = [n for n in model.equations if n in DRAG and n not in self.lost]
+        told = self.along and bool(drag)
+        if told and self.level:
+            self.lost += drag
+            self.remarks.append(f"no ax_mps2: {', '.join(drag)} left out")
+        elif not thrust.known:
+            self.lost += drag
+            if told:
+                self.remarks.append(
+                    f"no thrust known: {', '.join(drag)} left out, the other coefficients hold what"
+                    " thrust adds; give [propulsion] and throttle, thrust_n or power_w"
+                )
+        if thrust.thrust_n is not None:
+            self.columns["thrust_n"] = thrust.thrust_n
+        self.columns.setdefault("throttle", self.zeros)
+        if thrust.assumed_share is not None:
+            self.assumed["thrust_share"] = thrust.assumed_share
 
 
 def _level_flight(columns: Mapping[str, Array]) -> dict[str, Array]:

@@ -63,10 +63,7 @@ def _shifts(search: SearchResult, equation: str, told: Mapping[str, float]) -> d
     if not moved or not blocks:
         return {}
     count = len(labels)
-    terms, instruments = (
-        np.vstack([b.without_trend(side[:, :count]) for b, side in pairs])
-        for pairs in ([(b, b.A) for b in blocks], [(b, b.Z) for b in blocks])
-    )
+    terms, instruments = _term_columns(blocks, count)
     lags = np.vstack([_lag_columns(search, b, moved) for b in blocks])
     left = np.concatenate([b.residual_after(search.final.solution.step) for b in blocks])
     alone, _ = _instrumented(terms, instruments, left)
@@ -76,12 +73,27 @@ def _shifts(search: SearchResult, equation: str, told: Mapping[str, float]) -> d
     noise = float(np.sum((left - wide @ beside) ** 2)) / max(freedom, 1)
     deviation = np.sqrt(noise * np.diag(covariance)[count:])
     signs = np.sign([told.get(f"{equation}_{labels[k]}", 0.0) for k in moved])
-    # Of a surface that comes later its slope has the other sign.
-    late = float(np.max(-signs * beside[count:] / np.maximum(deviation, 1e-300)))
-    if freedom < 1 or len(moved) * special.stdtr(freedom, -late) > SIGNIFICANCE:
+    if not _late(-signs * beside[count:], deviation, freedom):
         return {}
     shift = beside[:count] - alone
     return {f"{equation}_{label}": float(s) for label, s in zip(labels, shift, strict=True)}
+
+
+def _term_columns(blocks: Sequence[EquationBlock], count: int) -> tuple[Array, Array]:
+    """Return the terms of an equation in all blocks and their instruments, without trends."""
+    terms = np.vstack([b.without_trend(b.A[:, :count]) for b in blocks])
+    instruments = np.vstack([b.without_trend(b.Z[:, :count]) for b in blocks])
+    return terms, instruments
+
+
+def _late(slopes: Array, deviation: Array, freedom: int) -> bool:
+    """Return whether a surface comes later than its column, by a one-sided test of all.
+
+    Of a surface that comes later its slope has the other sign.
+    """
+    largest = float(np.max(slopes / np.maximum(deviation, 1e-300)))
+    chance = len(slopes) * special.stdtr(freedom, -largest)
+    return freedom >= 1 and not chance > SIGNIFICANCE
 
 
 def _instrumented(columns: Array, instruments: Array, left: Array) -> tuple[Array, Array]:

@@ -27,7 +27,7 @@ from host.sysid.coefficients.coefficient_fit import (
 )
 from host.sysid.coefficients.deletion_diagnostics import CrossValidation
 from host.sysid.models.consider_covariance import consider_covariance
-from host.sysid.numerics.maneuver_agreement import scatter_test
+from host.sysid.numerics.maneuver_agreement import ManeuverAgreement, scatter_test
 
 LEAST_EIGENVALUE = 1e-12  # of the largest; below it is rounding
 
@@ -42,7 +42,26 @@ def pool_fits(fits: Sequence[CoefficientFit]) -> CoefficientFit:
     """
     if len(fits) == 1:
         return fits[0]
+    _check_same_terms(fits)
+    errors = tuple(dict.fromkeys(name for fit in fits for name in fit.errors))
+    has = np.array([[name in fit.errors for name in errors] for fit in fits], dtype=np.float64)
+    fits = [_with_all_errors(fit, errors) for fit in fits]
+    state, covariance, agreement = _pooled(fits, has)
     count = len(fits[0].derivatives)
+    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    known = zip(errors, state[count:].tolist(), sd[count:].tolist(), strict=True)
+    return CoefficientFit(
+        derivatives=_pooled_derivatives(fits, state, sd),
+        covariance=covariance,
+        errors={name: (value, deviation) for name, value, deviation in known},
+        condition=_mean_condition([fit.condition for fit in fits]),
+        histories=_joined_histories(fits),
+        prediction=_predictions([fit.prediction for fit in fits]),
+        maneuver_agreement=agreement,
+    )
+
+
+def _check_same_terms(fits: Sequence[CoefficientFit]) -> None:
     names = [d.name for d in fits[0].derivatives]
     for number, fit in enumerate(fits, start=1):
         if [d.name for d in fit.derivatives] != names:
@@ -50,15 +69,24 @@ def pool_fits(fits: Sequence[CoefficientFit]) -> CoefficientFit:
                 f"flight 1 and flight {number} do not tell the same coefficients (another axis"
                 " flown, another surface moved, thrust not known in one): fit them one at a time"
             )
-    mine = [tuple(fit.errors) for fit in fits]
-    errors = tuple(dict.fromkeys(name for own in mine for name in own))
-    fits = [_with_all_errors(fit, errors) for fit in fits]
+
+
+def _pooled(fits: Sequence[CoefficientFit], has: Array) -> tuple[Array, Array, ManeuverAgreement]:
+    """Return state and covariance of all flights, and how far the flights agree.
+
+    Parameters
+    ----------
+    fits : sequence of CoefficientFit
+        With the same errors.
+    has : Array, shape (flights, errors)
+        1 where a flight has an error.
+    """
+    count = len(fits[0].derivatives)
     found = np.stack([_state(fit) for fit in fits])
     common = np.stack([_common_error_root(fit.covariance, count) for fit in fits])
     own = np.stack([f.covariance - c @ c.T for f, c in zip(fits, common, strict=True)])
     noise = np.maximum(np.einsum("kii->ki", own), 1e-300)
     weight = np.full_like(found, 1.0 / len(fits))
-    has = np.array([[name in own for name in errors] for own in mine], dtype=np.float64)
     weight[:, count:] = has / has.sum(axis=0)
     weight[:, :count] = (1.0 / noise / np.sum(1.0 / noise, axis=0))[:, :count]
     state = np.sum(weight * found, axis=0)
@@ -66,31 +94,32 @@ def pool_fits(fits: Sequence[CoefficientFit]) -> CoefficientFit:
     influence = weight[:, :count] * (found - state)[:, :count]
     total_variance = np.einsum("kii->ki", np.stack([fit.covariance for fit in fits]))
     expected = np.sum(weight**2 * total_variance, axis=0)[:count]
-    agreement = scatter_test(tuple(names), influence, weight[:, :count], expected)
+    names = tuple(d.name for d in fits[0].derivatives)
+    agreement = scatter_test(names, influence, weight[:, :count], expected)
     covariance += consider_covariance(np.einsum("ki,kij->ji", weight, common))
     covariance[np.diag_indices(count)] += agreement.extra_variance
-    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return state, covariance, agreement
+
+
+def _pooled_derivatives(
+    fits: Sequence[CoefficientFit], state: Array, sd: Array
+) -> tuple[Derivative, ...]:
     floors = np.mean([[_floor(d) for d in fit.derivatives] for fit in fits], axis=0)
-    sizes = np.maximum(np.abs(state[:count]), floors)
-    known = zip(errors, state[count:].tolist(), sd[count:].tolist(), strict=True)
-    return CoefficientFit(
-        derivatives=tuple(
-            Derivative(name, float(state[k]), float(NORMAL_95 * sd[k]), float(sizes[k]))
-            for k, name in enumerate(names)
-        ),
-        covariance=covariance,
-        errors={name: (value, deviation) for name, value, deviation in known},
-        condition=_mean_condition([fit.condition for fit in fits]),
-        histories={
-            name: CoefficientHistory(
-                np.concatenate([fit.histories[name].measured for fit in fits]),
-                np.concatenate([fit.histories[name].model for fit in fits]),
-            )
-            for name in fits[0].histories
-        },
-        prediction=_predictions([fit.prediction for fit in fits]),
-        maneuver_agreement=agreement,
+    sizes = np.maximum(np.abs(state[: len(floors)]), floors)
+    return tuple(
+        Derivative(d.name, float(state[k]), float(NORMAL_95 * sd[k]), float(sizes[k]))
+        for k, d in enumerate(fits[0].derivatives)
     )
+
+
+def _joined_histories(fits: Sequence[CoefficientFit]) -> dict[str, CoefficientHistory]:
+    return {
+        name: CoefficientHistory(
+            np.concatenate([fit.histories[name].measured for fit in fits]),
+            np.concatenate([fit.histories[name].model for fit in fits]),
+        )
+        for name in fits[0].histories
+    }
 
 
 def _with_all_errors(fit: CoefficientFit, errors: Sequence[str]) -> CoefficientFit:
