@@ -9,12 +9,7 @@ from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.instrument.error_sources import AIRCRAFT_FILE, FLIGHT, INSTRUMENT
 from host.physical.recording import SURFACES, Recording
-from host.sysid.coefficients.geometry_prior import ELEVATOR_ARM, RUDDER_ARM, SIDEWASH
-from host.sysid.errors.airspeed_tolerance import AIRSPEED
-from host.sysid.errors.error_list import (
-    CONSIDERED,
-    ESTIMATED,
-    NOT_PAID,
+from host.sysid.errors import (
     ErrorSource,
     by_cause,
     error_kinds,
@@ -27,6 +22,7 @@ from host.sysid.reconstruction.sensor_dynamics import DELAYED_COLUMNS, PLACES, P
 
 NAME = "ultrastick25e"
 AIRSPEED_MPS = 20.0
+BY_DRAWING = {"elevator_arm_share", "rudder_arm_share", "sidewash_share"}
 
 
 def instrument(*, commanded: bool) -> SensorErrorModel:
@@ -68,12 +64,17 @@ def test_an_error_moves_corrected_signals_if_it_says_so(commanded: bool) -> None
 def test_every_error_that_an_estimator_meets_is_in_the_list_and_paid() -> None:
     kinds = error_kinds()
     of_linear = {*INSTANTANEOUS_ERRORS, *DELAYED_COLUMNS, *POTS, *SERVOS, "friction_share"}
-    of_linear |= {*(n for n in PLACES if n != "vane_y_m"), "clock_share", "servo_delay_s", AIRSPEED}
-    assert {n for n, k in kinds.items() if k.linear == CONSIDERED} == of_linear
+    of_linear |= {
+        *(n for n in PLACES if n != "vane_y_m"),
+        "clock_share",
+        "servo_delay_s",
+        "airspeed_share",
+    }
+    assert {n for n, k in kinds.items() if k.linear == "considered"} == of_linear
     met = {s.name for commanded in (False, True) for s in by_file(commanded=commanded)}
-    met |= {ELEVATOR_ARM, RUDDER_ARM, SIDEWASH}
-    assert {n for n, k in kinds.items() if k.coefficients in (CONSIDERED, ESTIMATED)} == met
-    assert not [n for n, k in kinds.items() if k.linear == k.coefficients == NOT_PAID]
+    met |= BY_DRAWING
+    assert {n for n, k in kinds.items() if k.coefficients in ("considered", "estimated")} == met
+    assert not [n for n, k in kinds.items() if k.linear == k.coefficients == "not paid"]
     with pytest.raises(KeyError, match="wing_wetness"):
         error_sources({"wing_wetness": 0.1}, None)
 

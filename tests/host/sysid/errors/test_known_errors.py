@@ -8,7 +8,7 @@ from host.instrument.deviations import unknown_sensors
 from host.physical.calibration import load_calibration
 from host.physical.recording import FOREIGN, Recording
 from host.sysid.answer import TRUSTED
-from host.sysid.errors.systematic_errors import systematic_residuals
+from host.sysid.errors import systematic_residuals
 from host.sysid.linear import Answer
 from host.sysid.models import Maneuver, Trim, template
 from host.sysid.numerics.output_error_problem import OutputProblem

@@ -20,8 +20,8 @@ from host.sysid.aerodynamics.coefficient_table import (
 )
 from host.sysid.answer import true_coefficients
 from host.sysid.answer.estimate_lines import model_lines
+from host.sysid.errors import add_systematic_covariance, systematic_error_shifts
 from host.sysid.errors.sampling_error import HOLD
-from host.sysid.errors.systematic_errors import add_systematic_covariance, systematic_error_shifts
 from host.sysid.linear import Answer, linear_answer, linear_model
 from host.sysid.models import Trim, template
 from host.sysid.models.residual_delays import STANDARD_DELAYS

@@ -9,7 +9,7 @@ from host.instrument.deviations import sensor_error_model
 from host.instrument.error_labels import ERROR_LABELS
 from host.physical.recording import AUTOPILOT, FOREIGN, Recording
 from host.sysid import Maneuver
-from host.sysid.errors.systematic_errors import systematic_error_shifts
+from host.sysid.errors import systematic_error_shifts
 from host.sysid.estimators.filter_error_gust import fit_with_gust
 from host.sysid.estimators.gust_model import gust_model
 from host.sysid.estimators.gust_penetration import with_gust_penetration
