@@ -17,7 +17,8 @@ from host.sysid.answer.settling_history import settling_document
 from host.sysid.coefficients.coefficient_fit import METHOD
 from host.sysid.flight.reconstructed_flight import maneuver_name
 from host.sysid.linear.linear_answer import Answer
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver, Grade
+from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers.maneuver_grade import Grade
 from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.model_constants import known_constants
 from host.sysid.models.parameter_units import parameter_unit

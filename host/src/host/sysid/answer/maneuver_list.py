@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from host.constants import DEG_PER_RAD
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver, Grade
+from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers.maneuver_grade import Grade
 
 
 def maneuver_lines(graded: Sequence[tuple[DetectedManeuver, Grade]]) -> list[str]:

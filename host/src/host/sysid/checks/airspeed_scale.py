@@ -25,7 +25,8 @@ from host.sysid.checks.driven_motion import (
     testable,
 )
 from host.sysid.checks.identity_factors import Identity
-from host.sysid.checks.kinematic_checks import OVER_AIRSPEED, identities
+from host.sysid.checks.kinematic_checks import OVER_AIRSPEED
+from host.sysid.checks.kinematic_identities import identities
 from host.sysid.checks.unit_sign_checks import airborne
 
 CHECK = "airspeed-scale"

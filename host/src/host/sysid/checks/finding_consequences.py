@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from host.arrays import Array
 from host.sysid.checks.data_finding import Finding
-from host.sysid.checks.unit_readings import reread
+from host.sysid.checks.unit_readings import Reading, reread
 from host.sysid.checks.unit_sign_checks import check
 
 MOST_READINGS = 4  # a map with more wrong lines is no map
@@ -35,30 +35,18 @@ def checked(
     accept : collection of str
         Checks whose findings change nothing; no other finding changes a column of theirs either.
     """
-    result, settled = dict(columns), []
+    result = dict(columns)
     findings = check(result)
     accepted = [f.accept() for f in findings if f.check in accept]
     kept = {name for f in accepted for name in f.channels}
+    settled: list[Finding] = []
     for _ in range(MOST_READINGS):
         asked = [f for f in findings if f.check not in accept]
         if not (found := reread(result, asked, kept)):
             break
-        reading, left = found
+        reading, findings = found
         result = reading.read(result)
-        remain = {(f.check, f.channels) for f in left}
-        for f in asked:
-            if (f.check, f.channels) in remain:
-                continue
-            # A doubt about a column that is read as it is: the wrong unit beside it made it.
-            if f.wrong_unit or set(f.channels) & set(reading.channels):
-                settled.append(
-                    replace(
-                        f,
-                        done=reading.line,
-                        wrong_unit=f.wrong_unit or not reading.weight,
-                    )
-                )
-        findings = left
+        settled += _settled(asked, reading, findings)
     for f in findings:
         if f.check in accept:
             continue
@@ -69,3 +57,15 @@ def checked(
         else:
             settled.append(f)
     return result, [*settled, *accepted]
+
+
+def _settled(asked: Sequence[Finding], reading: Reading, left: Sequence[Finding]) -> list[Finding]:
+    """Return the findings that a reading settles, with what was done."""
+    remain = {(f.check, f.channels) for f in left}
+    # A doubt about a column that is read as it is: the wrong unit beside it made it.
+    return [
+        replace(f, done=reading.line, wrong_unit=f.wrong_unit or not reading.weight)
+        for f in asked
+        if (f.check, f.channels) not in remain
+        and (f.wrong_unit or set(f.channels) & set(reading.channels))
+    ]

@@ -15,6 +15,7 @@ from host.arrays import Array
 
 SIGN_CORRELATION, FACTOR_CORRELATION = 0.5, 0.25  # partial: less tells nothing of either
 LARGEST_FACTOR = 1.5
+CHANCE = 3.0  # deviations, of a slope of the speed, which gusts along the path change too
 RIGHT_SHARE = 0.1  # of a motion, that scales of right sensors make of it
 
 
@@ -113,6 +114,15 @@ def factors(law: Identity, least: float = FACTOR_CORRELATION) -> Iterator[Factor
             continue
         low, high = sorted((xy / xx, yy / xy))  # noise on the left side, noise on the right
         yield Factor(law, name, low, high, xy**2 / (xx * yy))
+
+
+def may_be_one(f: Factor) -> bool:
+    """Return whether a factor may be one: of a speed gusts along the path leave more open."""
+    if f.high < 0.0:
+        return not f.certain
+    chance = CHANCE * f.chance if f.law.name == "airspeed_mps" else 0.0
+    within = LARGEST_FACTOR * (1.0 + chance)
+    return f.low <= within and f.high >= 1.0 / within
 
 
 def without(values: Array, columns: Array) -> Array:

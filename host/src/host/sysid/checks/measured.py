@@ -60,8 +60,24 @@ def measured(
         values = raw[name].copy()
         notes += [f"{name}: {note}" for note in _spikes(t, values)]
         raw[name] = values
-    usual_s = float(np.median(np.diff(t)))
     sampling = {name: sampling_of(raw[name]) for name in sensors}
+    held = {name: s.hold for name, s in sampling.items() if s.hold > 1}
+    if held:
+        rates = ", ".join(f"{name} every {rows} rows" for name, rows in held.items())
+        notes.append(f"a slower sensor's last value repeated, read where it was sampled: {rates}")
+    result, findings = _without_stuck(raw, sampling, longest_s, accept)
+    return Measured(result, notes, findings, sampling)
+
+
+def _without_stuck(
+    raw: Mapping[str, Array],
+    sampling: Mapping[str, Sampling],
+    longest_s: float,
+    accept: Collection[str],
+) -> tuple[dict[str, Array], list[Finding]]:
+    """Return the columns, missing where a sensor repeats itself or is stuck, and findings."""
+    t, sensors = raw["t_s"], list(sampling)
+    usual_s = float(np.median(np.diff(t)))
     result, findings = dict(raw), []
     flying = _airborne(raw, len(t))  # at rest on the ground anything may stand still
     look = {k: raw[k][flying] for k in ("t_s", *sensors)}
@@ -71,17 +87,12 @@ def measured(
         still_s = max(longest_s, LONGEST_HOLDS * own.hold * usual_s)
         stuck = stuck_runs(look, name, own.step, still_s)
         if stuck:
-            found = _stuck_finding(look, name, stuck)
-            accepted = found.check in accept
-            findings.append(found.accept() if accepted else found)
-            for first, end in () if accepted else stuck:
+            found = _stuck_finding(look, name, stuck).accepted_if(accept)
+            findings.append(found)
+            for first, end in () if found.accepted else stuck:
                 values[flying.start + first : flying.start + end] = np.nan
         result[name] = values
-    held = {name: s.hold for name, s in sampling.items() if s.hold > 1}
-    if held:
-        rates = ", ".join(f"{name} every {rows} rows" for name, rows in held.items())
-        notes.append(f"a slower sensor's last value repeated, read where it was sampled: {rates}")
-    return Measured(result, notes, findings, sampling)
+    return result, findings
 
 
 def _airborne(columns: Mapping[str, Array], rows: int) -> slice:

@@ -85,16 +85,10 @@ def reread(
             continue
         trial = reading.read(columns)
         after = check(trial)
-        settled = {(f.check, f.channels) for f in before} - {(f.check, f.channels) for f in after}
-        if not settled & {(f.check, f.channels) for f in proven} or len(after) >= len(before):
+        if not _settles(proven, before, after):
             continue
         flown, dt_s = airborne(trial)
-        close = related(flown, dt_s, least=0.0)
-        lost = [
-            pair
-            for pair, was in seen.items()
-            if close.get(pair, 0.0) < min(FACTOR_CORRELATION, KEPT_SHARE * was)
-        ]
+        lost = _lost(seen, related(flown, dt_s, least=0.0))
         if not any(_hidden(pair, reading, before) for pair in lost):
             score = round(misfit(flown, dt_s) + CERTAIN * len(after), 6)  # equal is equal
             found.append((score, reading, after))
@@ -103,6 +97,25 @@ def reread(
     least, best, after = min(found, key=lambda one: one[0])
     near = sorted((one for one in found if one[0] - least < CERTAIN), key=lambda one: one[0])
     return replace(best, as_likely=tuple(one.words for _, one, _ in near[1:])), after
+
+
+def _settles(
+    proven: Sequence[Finding], before: Sequence[Finding], after: Sequence[Finding]
+) -> bool:
+    """Return whether a reading settles a finding that is proven, and leaves fewer of all."""
+    had, asked, left = ({(f.check, f.channels) for f in some} for some in (before, proven, after))
+    return bool((had - left) & asked) and len(after) < len(before)
+
+
+def _lost(
+    seen: Mapping[tuple[str, str], float], close: Mapping[tuple[str, str], float]
+) -> list[tuple[str, str]]:
+    """Return what moved with what, and does so no more."""
+    return [
+        pair
+        for pair, was in seen.items()
+        if close.get(pair, 0.0) < min(FACTOR_CORRELATION, KEPT_SHARE * was)
+    ]
 
 
 def _hidden(pair: tuple[str, str], reading: Reading, before: Sequence[Finding]) -> bool:

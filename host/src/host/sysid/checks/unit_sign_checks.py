@@ -14,7 +14,8 @@ from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.sysid.checks.data_finding import HINT, Finding
 from host.sysid.checks.identity_factors import SIGN_CORRELATION, correlation
-from host.sysid.checks.kinematic_checks import BLOCK_S, FEWEST, block_means, consistent
+from host.sysid.checks.kinematic_checks import consistent
+from host.sysid.checks.kinematic_identities import BLOCK_S, FEWEST, block_means
 from host.sysid.maneuvers.maneuver_detection import THROTTLE
 
 BOUNDED = ("alpha_rad", "beta_rad", "theta_rad")

@@ -19,6 +19,7 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
 from host.sysid.numerics.nonlinear_problem import output_problem
+from host.sysid.numerics.output_error_problem import OutputProblem
 
 SINGULAR = 1e-12  # of the largest eigenvalue of the scaled information
 HALF_WAY = 0.5  # from one model or data to another: beyond it the record is nearer to the other
@@ -258,10 +259,7 @@ def _of_outputs(
         np.concatenate([w * J for w, J in zip(weight, r.sensitivities, strict=True)])
         for r in responses
     ]
-    H = np.diag(problem.prior_precision)
-    for k, J in enumerate(slopes):
-        own = problem.columns(k)
-        H[np.ix_(own, own)] += J.T @ J
+    H = _information(problem, slopes)
     if not np.isfinite(H).all():
         return None
     on_bound = (theta <= problem.lower) | (theta >= problem.upper)
@@ -283,6 +281,15 @@ def _of_outputs(
         target=np.array([k for _, k in known], dtype=np.int64),
         length=len(result.names),
     )
+
+
+def _information(problem: OutputProblem, slopes: Sequence[Array]) -> Array:
+    """Return the information on all unknowns, what is known beforehand with it, (T, T)."""
+    H = np.diag(problem.prior_precision)
+    for k, J in enumerate(slopes):
+        own = problem.columns(k)
+        H[np.ix_(own, own)] += J.T @ J
+    return H
 
 
 def _inverse_within(H: Array, held: BoolArray) -> Array:

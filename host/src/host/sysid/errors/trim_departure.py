@@ -34,24 +34,21 @@ from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
 from host.sysid.aerodynamics.left_out_terms import (
     NEEDED,
     UNKNOWN_MPS,
-    LeftOutTerm,
-    expected_left_out,
     terms_left_out,
 )
 from host.sysid.aerodynamics.path_thrust import rotor_means
 from host.sysid.aerodynamics.thrust_terms import thrust_terms
 from host.sysid.aerodynamics.unmeasured_motion import with_unmeasured
 from host.sysid.aerodynamics.varying_airspeed import MEASURED, SECOND_ORDER_TERMS, VaryingModel
-from host.sysid.errors.one_step import CERTAIN_SD, HALF_WAY, OneStep, one_step_of
+from host.sysid.errors.departure import Departure, expected_beside, with_second_order
+from host.sysid.errors.one_step import CERTAIN_SD, HALF_WAY, OneStep, Step, one_step_of
 from host.sysid.estimators.gust_model import gust_deviation_mps
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.rate_forces import has_rate_forces
-from host.sysid.models.state_space_model import LinearModel, Parameter
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
-from host.sysid.models.thrust_column import ThrustColumn
-from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.white_noise import white_deviation
 
 TURNED_ANGLES = ("alpha_rad", "beta_rad")
@@ -74,165 +71,72 @@ DRAWS = 4  # of the noise of the airspeed, each anew in every maneuver
 
 
 @dataclass(frozen=True, slots=True)
-class Departure:
-    """By how much an estimate moves, and what one step and second order leave open of it.
+class _Departing:
+    """A template whose coefficients depart from those at its trim.
 
     Attributes
     ----------
-    shares : Array, shape (maneuvers, P)
-        By how much each maneuver moves the joint estimate.
-    remainders : tuple of ShiftedEstimate
-    airspeed_noise : Array, shape (P, P)
-        What the noise of the measured airspeed adds to the covariance.
+    base : LinearModel
+        The template.
+    trim : Trim
     varying : VaryingModel
         What makes further inputs of the departures.
-    model : LinearModel
+    data : list of Maneuver
         With these inputs.
-    maneuvers : tuple of Maneuver
-        Those fitted, with these inputs.
+    cuts : list of mapping
+        All columns of each, those that nobody measured guessed.
     beside : dict
-        Terms that a template has not, of motion or thrust that was measured: what is expected, and
-        one deviation.
+        Terms that a template has not: what is expected, and one deviation.
+    expected : dict
+        What thrust is expected to do.
+    polar : dict
+        One deviation of the curvature of the drag polar.
     """
 
-    shares: Array
-    remainders: tuple[ShiftedEstimate, ...]
-    airspeed_noise: Array
+    base: LinearModel
+    trim: Trim
     varying: VaryingModel
-    model: LinearModel
-    maneuvers: tuple[Maneuver, ...]
+    data: list[Maneuver]
+    cuts: list[Mapping[str, Array]]
     beside: dict[str, tuple[float, float]]
+    expected: dict[str, float]
+    polar: dict[str, float]
 
     @property
-    def step(self) -> Array:
-        """By how much the estimate moves, (P,)."""
-        return np.asarray(self.shares.sum(axis=0))
-
-    def influence(self, details: Mapping[str, float | Array]) -> dict[str, Array]:
-        """Return the influence of each maneuver on the estimate moved, of that in the details.
-
-        Maneuvers whose airspeed went different ways disagree before the step, not behind it.
-        """
-        influence = details.get("maneuver_influence")
-        if not isinstance(influence, np.ndarray):
-            return {}
-        tested = np.any(influence != 0.0, axis=0)  # what need not agree stays out of the test
-        return {"maneuver_influence": influence + tested * self.shares}
+    def along(self) -> dict[str, float]:
+        """What is estimated along, and one deviation of each."""
+        return self.polar | {name: sd for name, (_, sd) in self.beside.items()}
 
     @property
-    def thrust(self) -> ThrustColumn | None:
-        """What measured thrust does; None where it stayed as airspeed has it, or is not known."""
-        own = {t.input_name for t in self.varying.thrust}
-        columns = [k for k, name in enumerate(self.model.inputs) if name in own]
-        if not columns:
-            return None
-        return ThrustColumn(*(M[:, columns].sum(axis=1) for M in (self.model.B, self.model.D)))
+    def cause(self) -> str:
+        """What an answer calls that of which the data leave something open."""
+        if self.varying.left_out:
+            return LEFT_OUT
+        return THRUST_ACTS if self.varying.thrust else DRAG_POLAR
 
-    def wide_model(self, base: LinearModel) -> LinearModel:
-        """Return a template with the departures as inputs, and the terms estimated along as
-        parameters behind its own."""
-        known = _with_second_order(self.varying.model, base, {})
-        more = [t for t in self.varying.model.terms if t.parameter in self.beside]
-        added = (Parameter(name, mean, prior_sd=sd) for name, (mean, sd) in self.beside.items())
-        return replace(
-            known,
-            terms=(*known.terms, *more),
-            parameters=(*known.parameters, *added),
-            delays=base.delays,
-        )
+    def model(self, known: Mapping[str, float]) -> LinearModel:
+        """Return the model with departures, some of what is estimated along at known values."""
+        return with_second_order(self.varying.model, self.base, {**self.expected, **known})
 
-    def expecting(self, result: FitResult) -> Departure:
-        """Return the same with what another fit of the template says of the size of the terms."""
-        return replace(self, beside=_left_out(result, self.varying.left_out))
+    def step(self, one_step: OneStep) -> Step:
+        """Return the step of the estimate, and of what is estimated along."""
+        unit = {name: self.expected.get(name, 0.0) + 1.0 for name in self.along}
+        bends = [(self.model({name: value}), self.data) for name, value in unit.items()]
+        deviations = list(self.along.values())
+        return one_step.joint(self.model({}), self.trim, self.data, bends, deviations)
 
-    def of_fit(self, wide: FitResult, length: int) -> Departure:
-        """Return the departures as a fit of `wide_model` has them: nothing is left to be moved.
-
-        `length` is that of the estimate without the terms.
-        """
-        known = {name: wide.value(name) for name in self.beside}
-        return replace(
-            self,
-            shares=np.zeros((len(self.maneuvers), length)),
-            remainders=(),
-            airspeed_noise=np.zeros((length, length)),
-            model=_with_second_order(self.varying.model, self.varying.base, known),
-        )
-
-    def removed_from(self, maneuvers: Sequence[Maneuver], estimate: Array) -> list[Maneuver]:
-        """Return the maneuvers as if nothing had departed; as they are if the model diverges.
-
-        Parameters
-        ----------
-        maneuvers : sequence of Maneuver
-            As fitted.
-        estimate : Array
-            Common parameters first.
-        """
-        return self._removed(self.maneuvers, maneuvers, estimate)
-
-    def removed_from_held_out(
-        self,
-        maneuvers: Sequence[Maneuver],
-        cuts: Sequence[Mapping[str, Array]],
-        estimate: Array,
-    ) -> list[Maneuver]:
-        """Return maneuvers that were not fitted, departures from the trim removed.
-
-        `cuts` holds all columns of each.
-        """
-        varying = self.varying
-        whole = [with_unmeasured(c, varying.base, estimate, varying.trim) for c in cuts]
-        wide = [
-            replace(m, inputs=varying.maneuver(c, m.dt_s).inputs)
-            for m, c in zip(maneuvers, whole, strict=True)
-        ]
-        return self._removed(wide, maneuvers, estimate)
-
-    def _removed(
-        self, departing: Sequence[Maneuver], maneuvers: Sequence[Maneuver], estimate: Array
-    ) -> list[Maneuver]:
-        return without_further_inputs(self.model, departing, maneuvers, estimate)
-
-
-def without_further_inputs(
-    model: LinearModel,
-    departing: Sequence[Maneuver],
-    maneuvers: Sequence[Maneuver],
-    estimate: Array,
-) -> list[Maneuver]:
-    """Return maneuvers as if the further inputs of a model had been none; as they are if it
-    diverges.
-
-    Parameters
-    ----------
-    model : LinearModel
-    departing : sequence of Maneuver
-        With all inputs of the model.
-    maneuvers : sequence of Maneuver
-        The same, with the first of them.
-    estimate : Array
-        Common parameters first.
-    """
-    if not maneuvers:
-        return []
-    trimmed = [
-        replace(
-            wide,
-            inputs=np.hstack([own.inputs, np.zeros_like(wide.inputs[:, own.inputs.shape[1] :])]),
-        )
-        for wide, own in zip(departing, maneuvers, strict=True)
-    ]
-    problems = [OutputProblem(model, data) for data in (departing, trimmed)]
-    theta = problems[0].first_guess()
-    theta[: problems[0].n_common] = estimate[: problems[0].n_common]
-    there, here = (problem.outputs(theta) for problem in problems)
-    if there is None or here is None:
-        return list(maneuvers)
-    return [
-        replace(m, outputs=m.outputs - (moved - still).T)
-        for m, moved, still in zip(maneuvers, there, here, strict=True)
-    ]
+    def found(self, step: Step, open_ones: Sequence[ShiftedEstimate], noise: Array) -> Departure:
+        """Return the departure of a step, and what stays open of it."""
+        known = {
+            name: self.expected.get(name, 0.0) + float(value)
+            for name, value in zip(self.along, step.added, strict=True)
+        }
+        # What is fitted with thrust has the drag polar beside it.
+        polar = {name: (0.0, sd) for name, sd in self.polar.items()} if self.expected else {}
+        return Departure(
+            step.shares, tuple(open_ones), noise, self.varying, self.model(known),
+            tuple(self.data), polar | self.beside,
+        )  # fmt: skip
 
 
 def correct_trim_departure(
@@ -270,85 +174,111 @@ def correct_trim_departure(
     base = result.model
     if not departures_measured(base.name, cuts):
         return None
+    departing = _departing(result, maneuvers, cuts, airframe, trim, spin)
+    one_step = one_step_of(result, maneuvers if fitted is None else fitted, departing.trim)
+    if one_step is None:
+        return None
+    guessed = any(c not in cut for cut in cuts for c in _needed(base))
+    if guessed and _guessed_in_vain(one_step, result, maneuvers, departing):
+        return None
+    found = departing.step(one_step)
+    if not np.isfinite(found.shares).all():
+        return None
+    moved = result.estimate + found.shares.sum(axis=0)
+    noise: Array = np.zeros((len(moved), len(moved)))
+    turned: Array = np.zeros((0, len(moved)))
+    if fitted is not None:  # the fit that stands: the rough one before it is measured as it is
+        still = one_step.change(departing.model({}), departing.trim, departing.data)
+        turned = _by_turning_air(one_step, result, departing, still)
+        noise = _by_airspeed_noise(one_step, result, departing, still)
+    open_ones = [
+        (DEPARTURES, REMAINDER_SHARE * found.shares.sum(axis=0)),
+        *((departing.cause, shift) for shift in _root(found.covariance) @ found.by_added),
+        *((TURNING_AIR, shift) for shift in turned),
+    ]
+    return departing.found(
+        found, [ShiftedEstimate(name, moved + s, 1.0, 1.0) for name, s in open_ones], noise
+    )
+
+
+def _departing(
+    result: FitResult,
+    maneuvers: Sequence[Maneuver],
+    cuts: Sequence[Mapping[str, Array]],
+    airframe: AirframeData | None,
+    trim: Trim,
+    spin: tuple[float, float],
+) -> _Departing:
+    """Return the model of a result with its departures, and what they are in the columns."""
+    base = result.model
     left_out = terms_left_out(base.name, cuts[0], trim)
     if not trim.known:
         trim = replace(trim, airspeed_mps=UNKNOWN_MPS)
-    assumed = any(c not in cut for cut in cuts for c in _needed(base))
-    cuts = [with_unmeasured(c, base, result.estimate, trim) for c in cuts]
-    one_step = one_step_of(result, maneuvers if fitted is None else fitted, trim)
-    if one_step is None:
-        return None
-    thrust = thrust_terms(base, cuts, trim, airframe)
+    whole = [with_unmeasured(c, base, result.estimate, trim) for c in cuts]
+    thrust = thrust_terms(base, whole, trim, airframe)
     varying = VaryingModel(base, base.name, trim, airframe, spin, left_out, thrust)
-    # Without accelerometers the lift of pitching passes for a scale of alpha: nothing is guessed
-    # where the model has none.
-    guessed = assumed and not left_out
-    if guessed and not varying.forces and not has_rate_forces(base):
-        return None
-    beside = _left_out(result, (*left_out, *thrust))
-    expected = {t.name: beside[t.name][0] for t in thrust}
-    straight = _with_second_order(varying.model, base, expected)
-    polar = _curvature_sd(result, trim)
-    along = polar | {name: sd for name, (_, sd) in beside.items()}
-    curved = [
-        _with_second_order(varying.model, base, {**expected, name: expected.get(name, 0.0) + 1.0})
-        for name in along
-    ]
-    if thrust:  # what is fitted with it has the drag polar beside it
-        beside = {name: (0.0, sd) for name, sd in polar.items()} | beside
-    data = [
-        replace(m, inputs=varying.maneuver(c, m.dt_s).inputs)
-        for m, c in zip(maneuvers, cuts, strict=True)
-    ]
-    if guessed and _linear(one_step, result, maneuvers, straight, data, trim):
-        return None
-    bends = [(model, data) for model in curved]
-    found = one_step.joint(straight, trim, data, bends, list(along.values()))
-    if not np.isfinite(found.shares).all():
-        return None
-    step = found.shares.sum(axis=0)
-    unknown = _root(found.covariance) @ found.by_added
-    cause = LEFT_OUT if left_out else THRUST_ACTS if thrust else DRAG_POLAR
-    # Only the fit that stands has intervals: the rough one before it is measured as it is.
-    along_mps = 0.0 if fitted is None else gust_deviation_mps(result, trim.airspeed_mps)
-    turned: Array = np.zeros((0, len(step)))
-    noise: Array = np.zeros((len(step), len(step)))
-    if fitted is not None:
-        still = one_step.change(straight, trim, data)
-        if along_mps > 0.0:
-            moved = one_step.change(_with_turning_gust(straight), trim, data)
-            turned = TURNING_SHARE * along_mps * (moved - still)
-        deviation = float(white_deviation([c["airspeed_mps"] for c in cuts]))
-        noisy = [_with_airspeed_noise(varying, data, cuts, deviation, n) for n in range(DRAWS)]
-        drawn = [one_step.change(straight, trim, one) - still for one in noisy]
-        fitted_too = np.diag(result.covariance) > 0.0  # what the fit left out stays out
-        noise = consider_covariance(np.vstack(drawn) * fitted_too / np.sqrt(DRAWS))
-    known = {
-        name: expected.get(name, 0.0) + float(value)
-        for name, value in zip(along, found.added, strict=True)
-    }
-    return Departure(
-        found.shares,
-        (
-            ShiftedEstimate(DEPARTURES, result.estimate + step + REMAINDER_SHARE * step, 1.0, 1.0),
-            *(ShiftedEstimate(cause, result.estimate + step + s, 1.0, 1.0) for s in unknown),
-            *(ShiftedEstimate(TURNING_AIR, result.estimate + step + s, 1.0, 1.0) for s in turned),
-        ),
-        noise,
+    beside = expected_beside(result, (*left_out, *thrust))
+    return _Departing(
+        base,
+        trim,
         varying,
-        _with_second_order(varying.model, base, known),
-        tuple(data),
+        [
+            replace(m, inputs=varying.maneuver(c, m.dt_s).inputs)
+            for m, c in zip(maneuvers, whole, strict=True)
+        ],
+        list(whole),
         beside,
+        {t.name: beside[t.name][0] for t in thrust},
+        _curvature_sd(result, trim),
     )
+
+
+def _by_turning_air(
+    one_step: OneStep, result: FitResult, departing: _Departing, still: Array
+) -> Array:
+    """Return what a gust along the path does that turns with the aircraft, one deviation."""
+    along_mps = gust_deviation_mps(result, departing.trim.airspeed_mps)
+    if along_mps <= 0.0:
+        return np.zeros((0, len(result.estimate)))
+    turning = _with_turning_gust(departing.model({}))
+    moved = one_step.change(turning, departing.trim, departing.data)
+    return np.asarray(TURNING_SHARE * along_mps * (moved - still))
+
+
+def _by_airspeed_noise(
+    one_step: OneStep, result: FitResult, departing: _Departing, still: Array
+) -> Array:
+    """Return what the noise of the measured airspeed adds to the covariance, (P, P)."""
+    data, cuts, straight = departing.data, departing.cuts, departing.model({})
+    deviation_mps = float(white_deviation([c["airspeed_mps"] for c in cuts]))
+    drawn = []
+    for draw in range(DRAWS):
+        noisy = _with_airspeed_noise(departing.varying, data, cuts, deviation_mps, draw)
+        drawn.append(one_step.change(straight, departing.trim, noisy) - still)
+    fitted_too = np.diag(result.covariance) > 0.0  # what the fit left out stays out
+    return consider_covariance(np.vstack(drawn) * fitted_too / np.sqrt(DRAWS))
+
+
+def _guessed_in_vain(
+    one_step: OneStep, result: FitResult, maneuvers: Sequence[Maneuver], departing: _Departing
+) -> bool:
+    """Return whether departures of columns that nobody measured are no part of the record.
+
+    Without accelerometers the lift of pitching passes for a scale of alpha: nothing is guessed
+    where the model has none.
+    """
+    varying = departing.varying
+    if varying.left_out:
+        return False
+    forceless = not varying.forces and not has_rate_forces(departing.base)
+    return forceless or _linear(one_step, result, maneuvers, departing)
 
 
 def _linear(
     one_step: OneStep,
     result: FitResult,
     maneuvers: Sequence[Maneuver],
-    departing: LinearModel,
-    data: Sequence[Maneuver],
-    trim: Trim,
+    departing: _Departing,
 ) -> bool:
     """Return whether the record has no departures, as a linear simulator's.
 
@@ -356,8 +286,8 @@ def _linear(
     parameter: of a linear lateral record in white noise what they added was not there, and the
     test of coherence widened L_p 2.6 times.
     """
-    whole = (departing, data)
-    share, sd = one_step.share_of(whole, result, trim, maneuvers, LOOSE_SHARE)
+    whole = (departing.model({}), departing.data)
+    share, sd = one_step.share_of(whole, result, departing.trim, maneuvers, LOOSE_SHARE)
     return share < HALF_WAY and 1.0 - share > CERTAIN_SD * sd
 
 
@@ -392,14 +322,6 @@ def _root(covariance: Array) -> Array:
     return np.asarray((vector * np.sqrt(np.maximum(value, 0.0))).T)
 
 
-def _left_out(result: FitResult, terms: Sequence[LeftOutTerm]) -> dict[str, tuple[float, float]]:
-    """Return what is expected of each term that the template leaves out, by its neighbours."""
-    error = result.standard_error
-    like = {t.like for t in terms if t.like}
-    known = {n: (result.value(n), float(error[result.index(n)])) for n in like}
-    return expected_left_out(terms, known)
-
-
 def _curvature_sd(result: FitResult, trim: Trim) -> dict[str, float]:
     """Return which term of second order the data tell, and its prior deviation.
 
@@ -413,25 +335,6 @@ def _curvature_sd(result: FitResult, trim: Trim) -> dict[str, float]:
         for name, row, _ in SECOND_ORDER_TERMS[result.model.name]
         if row == "airspeed_mps"
     }
-
-
-def _with_second_order(
-    varying: LinearModel, base: LinearModel, known: Mapping[str, float]
-) -> LinearModel:
-    """Return the model with departures, terms of second order at known values, others at none."""
-    more = {p.name for p in varying.parameters[len(base.parameters) :]}
-    B, D = varying.B.copy(), varying.D.copy()
-    for t in varying.terms:
-        if t.parameter in known and t.matrix in "BD":
-            (B if t.matrix == "B" else D)[t.row, t.column] += t.gain * known[t.parameter]
-    return replace(
-        varying,
-        name=base.name,
-        B=B,
-        D=D,
-        terms=tuple(t for t in varying.terms if t.parameter not in more),
-        parameters=base.parameters,
-    )
 
 
 def _with_airspeed_noise(

@@ -14,7 +14,8 @@ from host.sysid.flight.reconstructed_flight import (
     ReconstructedFlight,
     flown_maneuvers,
 )
-from host.sysid.maneuvers.maneuver_detection import grade
+from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers.maneuver_grade import grade
 from host.sysid.maneuvers.maneuver_selection import HELD_OUT_FROM, SURFACES, joined_windows
 
 WEAK_GRADE = 0.2
@@ -46,44 +47,52 @@ def fitted_and_held_out(
     NoManeuverError
         If there is none.
     """
+    own = [_of_axes(flight.maneuvers, axes, template, named=named) for flight in flights]
+    mine = flown_maneuvers(flights, joined_windows(own))
+    if not mine:
+        raise NoManeuverError(_nothing_moved(flights) or _other_moved(flights, axes, template))
+    # The order in which flights are given shall not choose the maneuver that is held out.
+    mine.sort(key=lambda m: [(f.start_s, f.end_s, f.amplitude) for f in m.flight.maneuvers])
+    good = [m for m in mine if _worth_it(m)] or mine
+    held = _held_out([m for m in good if not m.found.given])
+    return [m for m in good if m not in held], [replace(m, found=m.found.response()) for m in held]
+
+
+def _of_axes(
+    found: Sequence[DetectedManeuver], axes: Sequence[str], template: str, *, named: bool
+) -> list[DetectedManeuver]:
+    """Return the maneuvers of some surfaces, and given ones of a model that the user names."""
+    own = [f for f in found if f.axis in axes or (f.given and named)]
+    return [replace(f, free_end_s=-np.inf) for f in own] if template in QUICK else own
+
+
+def _worth_it(maneuver: FlownManeuver) -> bool:
+    """Return whether a maneuver was given, or promises more than noise."""
+    found = maneuver.found
+    return found.given or grade(maneuver.flight.corrected, found).score >= WEAK_GRADE
+
+
+def _other_moved(flights: Sequence[ReconstructedFlight], axes: Sequence[str], template: str) -> str:
+    """Return which maneuvers flights have in place of those of a model."""
     every = [f for flight in flights for f in flight.maneuvers]
-    if not every and not any(axis in one.recorded for one in flights for axis in SURFACES):
-        raise NoManeuverError(
+    given = "; argument models names it all the same" if every[0].given else ""
+    others = ", ".join(sorted({f.axis for f in every}))
+    return f"no maneuver of {', '.join(axes)} for {template}; found only {others}{given}"
+
+
+def _nothing_moved(flights: Sequence[ReconstructedFlight]) -> str:
+    """Return why flights have no maneuver at all, and what to do; empty where they have one."""
+    if any(flight.maneuvers for flight in flights):
+        return ""
+    if not any(axis in one.recorded for one in flights for axis in SURFACES):
+        return (
             f"no column of a surface ({', '.join(SURFACES)}); name one in a map (argument mapping),"
             " or give a stretch (argument from_s, argument to_s)"
         )
-    if not every:
-        raise NoManeuverError(
-            "no maneuver found: no surface moved by more than 1.4 degrees at once; give"
-            " argument from_s and argument to_s, or fly a doublet or 3-2-1-1 of 3 degrees or"
-            " more"
-        )
-    mine = flown_maneuvers(
-        flights,
-        joined_windows(
-            [
-                [
-                    replace(f, free_end_s=-np.inf) if template in QUICK else f
-                    for f in x.maneuvers
-                    if f.axis in axes or (f.given and named)
-                ]
-                for x in flights
-            ]
-        ),
+    return (
+        "no maneuver found: no surface moved by more than 1.4 degrees at once; give argument from_s"
+        " and argument to_s, or fly a doublet or 3-2-1-1 of 3 degrees or more"
     )
-    # The order in which flights are given shall not choose the maneuver that is held out.
-    mine.sort(key=lambda m: [(f.start_s, f.end_s, f.amplitude) for f in m.flight.maneuvers])
-    if not mine:
-        given = "; argument models names it all the same" if every[0].given else ""
-        raise NoManeuverError(
-            f"no maneuver of {', '.join(axes)} for {template}; found"
-            f" only {', '.join(sorted({f.axis for f in every}))}{given}"
-        )
-    good = [
-        m for m in mine if m.found.given or grade(m.flight.corrected, m.found).score >= WEAK_GRADE
-    ] or mine
-    held = _held_out([m for m in good if not m.found.given])
-    return [m for m in good if m not in held], [replace(m, found=m.found.response()) for m in held]
 
 
 def columns_of(used: Sequence[FlownManeuver]) -> dict[str, Array]:

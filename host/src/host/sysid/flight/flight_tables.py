@@ -19,7 +19,7 @@ from host.physical.calibration import Calibration, load_calibration
 from host.physical.recording import Recording
 from host.readers.autopilot_flight import is_autopilot_log
 from host.readers.autopilot_table import autopilot_table
-from host.readers.column_map import listed, mapped, missing_lines, read_map
+from host.readers.column_map import Line, listed, mapped, missing_lines, read_map
 from host.readers.column_sampling import Sampling
 from host.readers.derived_columns import derived_columns
 from host.readers.even_grid import FITTED, LONGEST_GAP_S, USED, even_grid, rows_in_order
@@ -126,7 +126,6 @@ def read_flight_columns(
     """
     wanted = ("t_s", *USED, *(name for name in also if name not in USED))
     lines = read_map(mapping, wanted) if mapping is not None else {}
-    theirs = {name: line.foreign for name, line in lines.items()}
     found, recorded = _read(
         source,
         mapping,
@@ -136,28 +135,14 @@ def read_flight_columns(
         row_rate_hz,
     )
     leave_infinities_out(found)
-    called = source_name(source)
-    raw, notes = dict(found.columns), found.notes
+    raw, notes = found.columns, found.notes
     if mapping is not None:
-        # A column of a log is ours; one of a table that happens to have our name need not be.
-        shown = raw if recorded or found.shares else {k: v for k, v in raw.items() if k == "t_s"}
-        raw = shown | mapped(found.columns, found.unusable, lines, mapping, found.twice)
-        notes += missing_lines(lines, found.columns)
+        raw = _by_map(found, lines, mapping, ours=recorded)
         wanted = (*wanted, *(name for name in lines if name not in wanted))
-        found.recording = commanded_by_map(found.recording, lines)
-    if "t_s" not in raw:
-        raise IdentificationError(
-            f"{called}: no column t_s; name it in a map (argument mapping); "
-            + listed(found.columns, found.unusable)
-        )
     used = {k: raw[k] for k in wanted if k in raw}
-    both = [k for k in used if k in found.twice and k not in theirs]
-    if both:
-        raise IdentificationError(f"{called}: several columns '{both[0]}': rename them")
-    for name in used:
-        remark = found.remarks.get(theirs.get(name, name))
-        notes += [f"{name}: {remark}"] if remark else []
-    same_length(used, called)
+    theirs = {name: line.foreign for name, line in lines.items()}
+    _refuse_unusable(used, found, theirs, source_name(source))
+    notes += _remarks(used, found.remarks, theirs)
     if recorded:
         columns = even_grid(used, notes)
         columns |= input_columns(columns["t_s"], found.inputs)
@@ -176,6 +161,41 @@ def read_flight_columns(
         _resolutions(seen.sampling, even, columns),
         tuple(s for s in found.shares if f"{s}_rad" not in lines),
     )
+
+
+def _by_map(
+    found: Foreign, lines: Mapping[str, Line], mapping: Path, *, ours: bool
+) -> dict[str, Array]:
+    """Return the columns of a table by our names; its notes and its recording know of the map."""
+    # A column of a log is ours; one of a table that happens to have our name need not be.
+    own = found.columns if ours or found.shares else {}
+    shown = own or {k: v for k, v in found.columns.items() if k == "t_s"}
+    found.notes += missing_lines(lines, found.columns)
+    found.recording = commanded_by_map(found.recording, lines)
+    return shown | mapped(found.columns, found.unusable, lines, mapping, found.twice)
+
+
+def _remarks(
+    used: Collection[str], said: Mapping[str, str], theirs: Mapping[str, str]
+) -> list[str]:
+    """Return what a reader says of the columns that are used."""
+    remarks = {name: said.get(theirs.get(name, name)) for name in used}
+    return [f"{name}: {remark}" for name, remark in remarks.items() if remark]
+
+
+def _refuse_unusable(
+    used: Mapping[str, Array], found: Foreign, theirs: Mapping[str, str], called: str
+) -> None:
+    """Refuse a table without time, with two columns of one name, or of several lengths."""
+    if "t_s" not in used:
+        raise IdentificationError(
+            f"{called}: no column t_s; name it in a map (argument mapping); "
+            + listed(found.columns, found.unusable)
+        )
+    both = [k for k in used if k in found.twice and k not in theirs]
+    if both:
+        raise IdentificationError(f"{called}: several columns '{both[0]}': rename them")
+    same_length(used, called)
 
 
 def _measured(columns: dict[str, Array], notes: list[str], accept: Collection[str]) -> Measured:

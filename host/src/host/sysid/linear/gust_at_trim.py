@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from host.sysid.aerodynamics.thrust_terms import beside_thrust, thrust_terms
-from host.sysid.errors.trim_departure import correct_trim_departure, without_further_inputs
+from host.sysid.errors.departure import without_further_inputs
+from host.sysid.errors.trim_departure import correct_trim_departure
 from host.sysid.estimators.filter_error_gust import fit_with_gust
 from host.sysid.estimators.gust_delays import advance_outputs
 from host.sysid.linear.linear_model import GUST

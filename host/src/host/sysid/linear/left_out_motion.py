@@ -15,7 +15,8 @@ import numpy as np
 from host.errors import IdentificationError
 from host.sysid.aerodynamics.left_out_terms import LEFT_OUT_TERMS, NEEDED
 from host.sysid.aerodynamics.thrust_terms import thrust_terms
-from host.sysid.errors.trim_departure import Departure, correct_trim_departure
+from host.sysid.errors.departure import Departure
+from host.sysid.errors.trim_departure import correct_trim_departure
 from host.sysid.estimators.filter_error_gust import fit_with_gust
 from host.sysid.estimators.gust_delays import CALM_MPS, advance_outputs
 from host.sysid.estimators.gust_model import gust_deviation_mps

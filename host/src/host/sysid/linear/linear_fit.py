@@ -11,7 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from host.arrays import Array
-from host.sysid.errors.trim_departure import Departure, correct_trim_departure
+from host.sysid.errors.departure import Departure
+from host.sysid.errors.trim_departure import correct_trim_departure
 from host.sysid.estimators.method_registry import fit, refuse_unless_finite
 from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
 from host.sysid.flight.column_change import ColumnChange, Record

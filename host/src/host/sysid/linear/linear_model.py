@@ -176,12 +176,7 @@ def template_and_method(
         raise IdentificationError(
             f"{GUST} needs airspeed_mps, which tells how fast gusts pass; give another method"
         )
-    shared = set.intersection(*(set(m.flight.corrected) for m in used))
-    doubted = shared & DOUBTFUL if _in_doubt(used) else set()
-    able = _delays_free(used, method)
-    model, remarks = fitted_template(shared - doubted, name, used, trim, method, able=able)
-    if doubted and "beta_rad" in model.states:
-        remarks = (*remarks, SIDE_FORCE_DOUBTED)
+    model, remarks = _without_doubtful(used, trim, name, method)
     known = used[0].flight.compatibility
     if known is not None and known.instrument is not None and frees_places(method):
         model = with_drag_arm(model, trim, known.instrument)
@@ -194,6 +189,19 @@ def template_and_method(
     if by != GUST and name == "lateral":
         model = without_attitude(model, used)
     return model, by, (*remarks, why) if why else remarks
+
+
+def _without_doubtful(
+    used: Sequence[FlownManeuver], trim: Trim, name: str, method: str
+) -> tuple[LinearModel, tuple[str, ...]]:
+    """Return a template of the columns that all maneuvers have and no finding doubts."""
+    shared = set.intersection(*(set(m.flight.corrected) for m in used))
+    doubted = shared & DOUBTFUL if _in_doubt(used) else set()
+    able = _delays_free(used, method)
+    model, remarks = fitted_template(shared - doubted, name, used, trim, method, able=able)
+    if doubted and "beta_rad" in model.states:
+        remarks = (*remarks, SIDE_FORCE_DOUBTED)
+    return model, remarks
 
 
 def _delays_free(used: Sequence[FlownManeuver], method: str) -> bool:

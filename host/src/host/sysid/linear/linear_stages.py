@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import CoefficientParts, ShiftedEstimate
 from host.sysid.aerodynamics.thrust_terms import THRUST_BESIDE
-from host.sysid.errors.trim_departure import Departure
+from host.sysid.errors.departure import Departure
 from host.sysid.flight.column_change import Record
 from host.sysid.linear.prepared_columns import PreparedColumns
 from host.sysid.models.diagnostics import SignalFit

@@ -46,13 +46,9 @@ def sustained_inputs(
     found: list[tuple[int, int]] = []
     for first, last in _spans(active):
         # Slow swings at both ends belong to it: small beside its own, but no rest yet.
-        small = max(
-            SMALL * float(np.median(swing[first : last + 1])), LOW * quiet, LOW_SHARE * least
-        )
-        going = flying & (swing > small)
-        before, after = np.flatnonzero(~going[:first]), np.flatnonzero(~going[last + 1 :])
-        first = int(before[-1]) + 1 if len(before) else 0
-        last += int(after[0]) if len(after) else len(t) - 1 - last
+        own = SMALL * float(np.median(swing[first : last + 1]))
+        going = flying & (swing > max(own, LOW * quiet, LOW_SHARE * least))
+        first, last = _run_about(going, first, last)
         if found and first <= found[-1][1]:
             first = found.pop()[0]
         found.append((first, last))
@@ -66,6 +62,13 @@ def sustained_inputs(
         for first, last in inner
         if (last - first) * dt_s >= SHORTEST_S and _turns(series[first : last + 1]) >= FEWEST_TURNS
     ]
+
+
+def _run_about(going: BoolArray, first: int, last: int) -> tuple[int, int]:
+    """Return the first and last sample of what goes on without a rest about a span."""
+    before, after = np.flatnonzero(~going[:first]), np.flatnonzero(~going[last + 1 :])
+    begun = int(before[-1]) + 1 if len(before) else 0
+    return begun, last + int(after[0]) if len(after) else len(going) - 1
 
 
 def _swing(series: Array, half: int) -> Array:

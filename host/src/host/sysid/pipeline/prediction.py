@@ -11,8 +11,8 @@ import numpy as np
 
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.sysid.aerodynamics.thrust_terms import with_thrust
 from host.sysid.answer.json_document import json_text
+from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.models.equation_file import KIND as EQUATIONS
 from host.sysid.models.model_file import read_model
 from host.sysid.models.named_models import model_path
@@ -130,11 +130,7 @@ def predict(
     """
     path = path_of("model", model)
     assert path is not None
-    path = model_path(path)
-    models, doubts = _saved_models(path)
-    late_s, thrust = _late_inputs(path), _thrust(path, models)
-    signals = {name for _, m in models for name in (*m.inputs, *m.outputs)} - {CONSTANT}
-    signals |= set(THRUST_COLUMNS if thrust is not None else ())
+    saved = _read_saved(model_path(path))
     sources = listed_flights(flights)
     each = reading_options(
         len(sources),
@@ -144,7 +140,7 @@ def predict(
         stretches=stretches,
         ends=(from_s, to_s),
         corrections=corrections,
-        also=tuple(sorted(signals)),
+        also=saved.signals,
         accept=accept,
         sensors=sensors,
         row_rate_hz=row_rate_hz,
@@ -154,27 +150,61 @@ def predict(
     for source, how in zip([sources[number] for number in kept], each, strict=True):
         known = aircraft_data(aircraft, how.calibration) if aircraft is not None else None
         ready = prepare(read_flight(source, how, known))
-        notes = (
-            *(finding.line for finding in ready.flight.findings),
-            *ready.notes,
-            *ready.unchecked,
-            *doubts,
-        )
+        models, notes = saved.driven(ready.flight)
+        said = (*(f.line for f in ready.flight.findings), *ready.notes, *ready.unchecked, *notes)
         flight = replace(
             ready.flight,
-            recorded=_as_delayed(ready.flight.recorded, late_s),
-            corrected=_as_delayed(ready.flight.corrected, late_s),
+            recorded=_as_delayed(ready.flight.recorded, saved.late_s),
+            corrected=_as_delayed(ready.flight.corrected, saved.late_s),
         )
-        driven = models
-        if thrust is not None:
-            rotor = known.powerplant if known is not None else None
-            flight = replace(flight, corrected=with_thrust(flight.corrected, rotor))
-            if THRUST in flight.corrected:
-                driven = [(label, thrust.beside(m)) for label, m in models]
-            else:
-                notes = (*notes, THRUST_HELD)
-        found.append(simulate(driven, flight, notes, constants=constants))
-    return Prediction(str(path), tuple(found), constants)
+        found.append(simulate(models, flight, said, constants=constants))
+    return Prediction(str(saved.path), tuple(found), constants)
+
+
+@dataclass(frozen=True, slots=True)
+class _Saved:
+    """A model file without free parameters.
+
+    Attributes
+    ----------
+    path : Path
+    models : list of (str, LinearModel)
+        One, or both axes of an aircraft.
+    doubts : list of str
+        Notes on parameters that nobody estimated.
+    late_s : dict
+        By how much each input is late.
+    thrust : ThrustColumn or None
+        What measured thrust does beside the model.
+    """
+
+    path: Path
+    models: list[tuple[str, LinearModel]]
+    doubts: list[str]
+    late_s: dict[str, float]
+    thrust: ThrustColumn | None
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Columns that the models need."""
+        own = {name for _, m in self.models for name in (*m.inputs, *m.outputs)} - {CONSTANT}
+        return tuple(sorted(own | set(THRUST_COLUMNS if self.thrust is not None else ())))
+
+    def driven(
+        self, flight: ReconstructedFlight
+    ) -> tuple[list[tuple[str, LinearModel]], tuple[str, ...]]:
+        """Return the models with the thrust of a flight beside them where it has one, and notes."""
+        notes = tuple(self.doubts)
+        if self.thrust is None:
+            return self.models, notes
+        if THRUST not in flight.corrected:
+            return self.models, (*notes, THRUST_HELD)
+        return [(label, self.thrust.beside(m)) for label, m in self.models], notes
+
+
+def _read_saved(path: Path) -> _Saved:
+    models, doubts = _saved_models(path)
+    return _Saved(path, models, doubts, _late_inputs(path), _thrust(path, models))
 
 
 def _saved_models(path: Path) -> tuple[list[tuple[str, LinearModel]], list[str]]:

@@ -94,28 +94,34 @@ def requested_models(given: ModelName | Iterable[ModelName] | None) -> Models:
                 f"a model is of type {type(name).__name__}, expected a name, a path, a LinearModel"
                 " or a CoefficientModel"
             )
-        elif name in AXIS_OF:
-            linear.append((str(name), None))
-        elif (str(name) and Path(name).exists()) or str(name).lower().endswith(".toml"):
-            read = read_model(Path(name), of_coefficients=True)
+        else:
+            read = _named_model(name)
             if isinstance(read, CoefficientModel):
                 terms.append(read)
             else:
                 linear.append((str(name), read))
-        elif str(name) in shipped_files():
-            linear.append((str(name), read_model(model_path(name))))
-        else:
-            raise IdentificationError(
-                f"no model '{name}'{like(str(name), (*AXIS_OF, COEFFICIENTS, *shipped_files()))};"
-                f" there are {', '.join(AXIS_OF)}, coefficients, those of the thesis (`--model"
-                " list`), or a TOML file"
-            )
     standard = standard_model() if COEFFICIENTS in names else None
     if len([t for t in terms if t is not standard]) + (standard is not None) > 1:
         raise IdentificationError(
             "argument models names several models of the coefficients; give one at a time"
         )
     return Models(tuple(linear), terms[0] if terms else None, bool(listed(given)))
+
+
+def _named_model(name: str | Path) -> LinearModel | CoefficientModel | None:
+    """Return a user's or a shipped model by its name; None of a template."""
+    called = str(name)
+    if name in AXIS_OF:
+        return None
+    if (called and Path(name).exists()) or called.lower().endswith(".toml"):
+        return read_model(Path(name), of_coefficients=True)
+    if called in shipped_files():
+        return read_model(model_path(name))
+    raise IdentificationError(
+        f"no model '{name}'{like(called, (*AXIS_OF, COEFFICIENTS, *shipped_files()))};"
+        f" there are {', '.join(AXIS_OF)}, coefficients, those of the thesis (`--model"
+        " list`), or a TOML file"
+    )
 
 
 def possible_models(asked: Models, columns: Sequence[Collection[str]]) -> tuple[Models, list[str]]:
