@@ -21,7 +21,7 @@ from host.errors import IdentificationError
 from host.readers.even_grid import even_columns
 from host.sysid.answer import true_coefficients
 from host.sysid.coefficients import CoefficientAnswer
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.pipeline import at_hand, identify_columns
 from host.twin.sensors.sensor_delays import dlpf_for, sensor_delays
 from host.twin.testcard.cards import load

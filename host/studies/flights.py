@@ -20,7 +20,7 @@ import numpy as np
 from host.errors import IdentificationError
 from host.sysid.answer import read_truth, true_coefficients
 from host.sysid.flight import read_columns
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver, detect_maneuvers
+from host.sysid.maneuvers import DetectedManeuver, detect_maneuvers
 from host.sysid.pipeline import at_hand, identify_columns
 
 FIRST_SEED = 200

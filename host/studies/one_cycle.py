@@ -18,7 +18,7 @@ from host.log import read_log
 from host.sysid.answer import true_coefficients
 from host.sysid.estimators.recursive import fit_recursive_fourier
 from host.sysid.flight import read_flight_columns
-from host.sysid.maneuvers.maneuver_detection import detect_maneuvers
+from host.sysid.maneuvers import detect_maneuvers
 from host.sysid.models import Maneuver, model_from
 
 from studies.linear import derivatives

@@ -34,7 +34,7 @@ from host.planning.point_widths import (
     single_point_card,
     test_points,
 )
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.twin.flight.fly import FlightRecord
 from host.twin.outcome.virtual_calibration import calibration
 from host.twin.recorder import sitl

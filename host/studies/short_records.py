@@ -19,7 +19,7 @@ from host.constants import GRAVITY_MPS2
 from host.errors import IdentificationError
 from host.physical.recording import FOREIGN, Recording
 from host.sysid.answer import CAREFUL, TRUSTED
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import Trim, template
 from host.sysid.pipeline import at_hand, identify_columns
 from scipy import signal

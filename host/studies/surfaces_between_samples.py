@@ -14,7 +14,7 @@ import numpy as np
 from host.arrays import Array
 from host.compiled import prefer_machine_code
 from host.physical.recording import FOREIGN, Recording
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import Trim, template
 from host.sysid.pipeline import at_hand, identify_columns
 from scipy import linalg, signal

@@ -14,7 +14,7 @@ import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.linear import DEFAULT_METHOD
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import model_from
 from host.sysid.pipeline import at_hand, identify_columns
 from scipy import signal

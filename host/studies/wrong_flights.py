@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from host.arrays import Array
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import LinearModel, Trim, template
 from scipy import signal
 

@@ -27,7 +27,7 @@ from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2, NORMAL_95
 from host.errors import IdentificationError
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.pipeline import ReadingOptions, aircraft_data, prepare, read_flight
 from numpy.typing import NDArray
 

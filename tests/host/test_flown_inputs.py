@@ -11,8 +11,8 @@ from host.log import FlightLog
 from host.log.flown_inputs import FlownInput, flown_inputs
 from host.log.quality import judge
 from host.sysid.flight import read_columns
+from host.sysid.maneuvers import detect_maneuvers
 from host.sysid.maneuvers.logged_inputs import input_columns
-from host.sysid.maneuvers.maneuver_detection import detect_maneuvers
 from host.wire.flight_card import card_bytes, parts
 from host.wire.schema_text import packed_schema
 

@@ -17,7 +17,7 @@ from host.live.test_point.point_estimate import PointEstimate, PointEstimator
 from host.planning.point_widths import PointPromise, point_derivatives
 from host.planning.predicted_widths import PredictedWidth
 from host.sysid.flight import ReconstructedFlight
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver, detect_maneuvers
+from host.sysid.maneuvers import DetectedManeuver, detect_maneuvers
 from host.twin.testcard.cards import Card, load
 from studies.radio_flights import RadioFlight, after_each_point, lost_in_bursts, radio_flight
 

@@ -25,7 +25,7 @@ from host.planning.aircraft_response import STEP_S, AircraftResponse
 from host.planning.point_widths import point_derivatives
 from host.planning.predicted_widths import FlightWidth, PredictedWidth
 from host.planning.wanted_input import RESPONSE_S, wanted_surfaces
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.twin.testcard.cards import Card, Segment, parse
 
 SPEED_MPS, START_S = 17.0, 18.0

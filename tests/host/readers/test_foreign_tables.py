@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from host.errors import IdentificationError
 from host.sysid.flight import read_columns, read_flight_columns
-from host.sysid.maneuvers.maneuver_detection import detect_maneuvers
+from host.sysid.maneuvers import detect_maneuvers
 from scipy import io
 
 LINES = {

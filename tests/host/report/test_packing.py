@@ -12,8 +12,7 @@ from host.report.overview import buckets, min_max
 from host.report.packing import Packed, pack
 from host.report.page_data import OVERVIEW_BYTES, PAGE_BYTES, page_data
 from host.report.shown_flight import ShownFlight
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
-from host.sysid.maneuvers.maneuver_grade import Grade
+from host.sysid.maneuvers import DetectedManeuver, Grade
 from numpy.typing import NDArray
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.sysid.estimators import methods
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import free_model
 from host.sysid.models.diagnostics import GRADES, NOT_IDENTIFIABLE
 from host.thesis.hopfield import LAMBDA, STEP_S, largest_stable_gain, network

@@ -13,7 +13,7 @@ from host.instrument.instrument_errors import InstrumentErrors
 from host.physical.recording import OWN, Recording
 from host.sysid.coefficients import CoefficientAnswer
 from host.sysid.linear import Answer
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import LinearModel
 from host.sysid.pipeline import aircraft_data, at_hand, flight_preparation, identify_columns
 from host.sysid.reconstruction.reconstruction import Compatibility

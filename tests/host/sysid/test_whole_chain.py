@@ -15,8 +15,7 @@ from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
 from host.sysid.flight import read_columns
 from host.sysid.linear import Answer
-from host.sysid.maneuvers.maneuver_detection import detect_maneuvers
-from host.sysid.maneuvers.maneuver_grade import grade
+from host.sysid.maneuvers import detect_maneuvers, grade
 from host.sysid.models import Trim, read_model
 from host.sysid.models.templates import longitudinal
 from host.sysid.numerics.output_error_problem import OutputProblem

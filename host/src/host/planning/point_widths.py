@@ -35,7 +35,7 @@ from host.sysid.coefficients import CoefficientModel, standard_model
 from host.sysid.coefficients.coefficient_estimator import coefficient_estimator
 from host.sysid.coefficients.window_spectra import ResidualSpectra
 from host.sysid.flight import reconstruct_flight
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver, detect_maneuvers
+from host.sysid.maneuvers import DetectedManeuver, detect_maneuvers
 from host.twin.testcard.cards import Card, Segment
 
 # What an input on an axis is flown for: damping, stiffness and control of the mode it excites.

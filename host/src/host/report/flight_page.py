@@ -15,8 +15,7 @@ from host.report.html_text import escaped, script_data
 from host.report.page_data import PageData, page_data
 from host.report.shown_flight import Happening, ShownFlight, is_simulated, quality
 from host.report.strip_list import strips_of
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
-from host.sysid.maneuvers.maneuver_grade import Grade
+from host.sysid.maneuvers import DetectedManeuver, Grade
 
 _MODULES = ("unpack", "samples", "strips", "track", "spectrum", "panels", "main")
 _LISTED = 200  # events and losses

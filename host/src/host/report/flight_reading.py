@@ -33,8 +33,7 @@ from host.report.gps_position import (
 )
 from host.report.shown_flight import Happening, ServoJump, ShownFlight, with_gaps
 from host.sysid.flight import read_columns
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver, detect_maneuvers
-from host.sysid.maneuvers.maneuver_grade import Grade, grade
+from host.sysid.maneuvers import DetectedManeuver, Grade, detect_maneuvers, grade
 from host.text import shown
 
 _HEAD_BYTES = 4096

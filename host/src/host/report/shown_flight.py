@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
-from host.sysid.maneuvers.maneuver_grade import Grade
+from host.sysid.maneuvers import DetectedManeuver, Grade
 
 GOOD, FAIR = 0.6, 0.3  # grades from these on
 _NO_BOARDS = ("sitl",)  # names of the recorder's own program without an aircraft about it

@@ -42,8 +42,7 @@ def run(args: argparse.Namespace) -> int:
     from host.sysid.answer.json_document import maneuver_document
     from host.sysid.answer.maneuver_list import maneuver_lines
     from host.sysid.flight import read_columns
-    from host.sysid.maneuvers.maneuver_detection import detect_maneuvers
-    from host.sysid.maneuvers.maneuver_grade import grade
+    from host.sysid.maneuvers import detect_maneuvers, grade
     from host.sysid.pipeline.arguments import option_words
 
     if str(args.map) == LIST:

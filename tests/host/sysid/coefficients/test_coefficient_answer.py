@@ -16,7 +16,7 @@ from host.sysid.coefficients.coefficient_estimator import merged_windows
 from host.sysid.coefficients.coefficient_modes import coefficient_modes, quantities
 from host.sysid.conversion.derivative_conversion import ConversionPoint, to_derivatives
 from host.sysid.flight import read_columns
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.pipeline import Identification, identify
 from scipy import io
 

@@ -15,7 +15,7 @@ from host.readers.even_grid import even_columns
 from host.sysid.coefficients import CoefficientFit
 from host.sysid.coefficients.coefficient_search import fit_coefficients, search_coefficients
 from host.sysid.coefficients.window_spectra import Window, window_transform
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.reconstruction.inverse_sensor_model import (
     Record,
     apply_sensor_errors,

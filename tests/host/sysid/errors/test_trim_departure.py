@@ -20,7 +20,7 @@ from host.sysid.estimators.start_values import regression_estimates, start_value
 from host.sysid.flight.reconstructed_flight import flown_maneuvers, reconstruct_flight
 from host.sysid.linear import gust_at_trim, linear_estimator, linear_fit
 from host.sysid.linear.linear_model import imu_place_m, without_attitude
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import FitResult, Trim, template
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.numerics.output_error_problem import OutputProblem

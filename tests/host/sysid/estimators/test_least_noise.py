@@ -14,7 +14,7 @@ from host.sysid.flight.reconstructed_flight import (
     flown_maneuvers,
     reconstruct_flight,
 )
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import Maneuver, Trim, template
 from host.sysid.reconstruction.reconstruction import Compatibility
 from scipy import signal

@@ -7,7 +7,7 @@ from host.physical.recording import AUTOPILOT, FOREIGN, OWN
 from host.readers.column_sampling import sampled_name
 from host.sysid.flight import FlownManeuver, ReconstructedFlight, with_filter_step
 from host.sysid.linear.linear_model import template_and_method
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import Trim, template
 from host.sysid.reconstruction.reconstruction import Compatibility
 from studies.wrong_flights import fly

@@ -8,7 +8,7 @@ from host.aircraft.mass_properties import AirframeData
 from host.constants import GRAVITY_MPS2
 from host.sysid.aerodynamics.thrust_terms import LEAST_SHARE, THRUST_BESIDE, with_thrust
 from host.sysid.linear import Answer
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import Trim
 
 from tests.host.sysid.at_hand import identify

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from host.arrays import Array
 from host.sysid.linear import Answer
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import Trim, template
 from scipy import signal
 from studies import short_records

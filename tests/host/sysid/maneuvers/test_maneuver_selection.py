@@ -11,8 +11,7 @@ import pytest
 from host.cli import main
 from host.errors import IdentificationError
 from host.sysid.flight import read_columns
-from host.sysid.maneuvers.maneuver_detection import AXES, detect_maneuvers
-from host.sysid.maneuvers.maneuver_grade import grade
+from host.sysid.maneuvers import AXES, detect_maneuvers, grade
 from host.sysid.maneuvers.maneuver_selection import (
     excited_axes,
     merge_overlapping,

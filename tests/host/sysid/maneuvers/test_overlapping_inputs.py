@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver, detect_maneuvers
+from host.sysid.maneuvers import DetectedManeuver, detect_maneuvers
 from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]

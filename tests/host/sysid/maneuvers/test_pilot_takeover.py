@@ -4,7 +4,7 @@ import pytest
 from host.arrays import Array
 from host.instrument.instrument_errors import usual_errors
 from host.physical.recording import FOREIGN
-from host.sysid.maneuvers.maneuver_detection import detect_maneuvers
+from host.sysid.maneuvers import detect_maneuvers
 from host.sysid.maneuvers.pilot_takeover import taken_over
 from studies import independent
 from studies.foreign.flight import INPUTS

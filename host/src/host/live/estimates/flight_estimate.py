@@ -24,7 +24,7 @@ from host.sysid.coefficients.coefficient_estimator import (
     coefficient_estimator,
 )
 from host.sysid.flight import FlightColumns, maneuver_name, read_flight_columns, reconstruct_flight
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver, detect_maneuvers
+from host.sysid.maneuvers import DetectedManeuver, detect_maneuvers
 from host.sysid.pipeline import AircraftData, aircraft_data
 from host.sysid.pipeline.surface_travel import with_surface_angles
 from host.sysid.reconstruction.servo_response import surface_positions

@@ -28,7 +28,7 @@ from host.planning.point_widths import (
 )
 from host.planning.predicted_widths import LIGHT_GUSTS_MPS, FlightWidth, PredictedWidth
 from host.sysid.coefficients.window_spectra import ResidualSpectra
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.twin.testcard.cards import Card, Segment
 
 PROMISE_FLIGHTS = 11  # half-widths scatter by 8 % from flight to flight

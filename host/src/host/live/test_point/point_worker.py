@@ -14,7 +14,7 @@ from typing import cast
 
 from host.live.test_point.point_estimate import PointEstimate
 from host.live.worker_process import WorkerEndedError, WorkerProcess
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.twin.testcard.cards import Card, Segment
 
 

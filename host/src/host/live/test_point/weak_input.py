@@ -12,7 +12,7 @@ import numpy as np
 from host.arrays import Array
 from host.planning.aircraft_response import STEP_S, AircraftResponse
 from host.planning.wanted_input import RESPONSE_S, SURFACES, wanted_surfaces
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+from host.sysid.maneuvers import DetectedManeuver
 from host.twin.testcard.cards import Segment, input_s
 from host.twin.testcard.input_shapes import STEPS
 

@@ -1,1 +1,24 @@
-"""Test points of a flight: found, graded, cut."""
+"""Test points of a flight: found, graded, cut.
+
+The face of the room: outside of `host.sysid` these names are imported from here.
+"""
+
+from host.faces import lazily
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from host.sysid.maneuvers.maneuver_detection import AXES, DetectedManeuver, detect_maneuvers
+    from host.sysid.maneuvers.maneuver_grade import Grade, grade
+
+__all__ = ["AXES", "DetectedManeuver", "Grade", "detect_maneuvers", "grade"]
+
+__getattr__ = lazily(
+    __name__,
+    {
+        "AXES": "maneuver_detection",
+        "DetectedManeuver": "maneuver_detection",
+        "Grade": "maneuver_grade",
+        "detect_maneuvers": "maneuver_detection",
+        "grade": "maneuver_grade",
+    },
+)
