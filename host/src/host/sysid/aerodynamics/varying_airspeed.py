@@ -183,15 +183,7 @@ class VaryingModel:
         return replace(
             base,
             name=f"{base.name}, airspeed varying",
-            inputs=(
-                *base.inputs,
-                *(f"{column} by V^{power}" for column, power in scaled),
-                *(f"rest of {name}" for name in (*base.states, *self.forces)),
-                *(f"{column} by alpha on {row}" for _, row, column in second_order),
-                *(("airspeed over its trim",) if airspeed else ()),
-                *(t.input_name for t in self.beside),
-                *(f"turning {of} on {row}" for row in turning_states for of in ("gust", *AXES)),
-            ),
+            inputs=self._input_names(),
             B=B,
             D=D,
             terms=tuple(terms),
@@ -200,6 +192,23 @@ class VaryingModel:
                 *(Parameter(name) for name, *_ in (*second_order, *airspeed)),
                 *(Parameter(t.name) for t in self.beside),
                 *more,
+            ),
+        )
+
+    def _input_names(self) -> tuple[str, ...]:
+        """Return the names of the columns of `maneuver`, in their order."""
+        base = self.base
+        return (
+            *base.inputs,
+            *(f"{column} by V^{power}" for column, power in self.scaled),
+            *(f"rest of {name}" for name in (*base.states, *self.forces)),
+            *(f"{column} by alpha on {row}" for _, row, column in SECOND_ORDER_TERMS[self.axis]),
+            *(("airspeed over its trim",) if AIRSPEED_TERMS[self.axis] else ()),
+            *(t.input_name for t in self.beside),
+            *(
+                f"turning {of} on {row}"
+                for row in GUST_TURNING_STATES[self.axis]
+                for of in ("gust", *AXES)
             ),
         )
 
@@ -232,9 +241,7 @@ class VaryingModel:
             raise IdentificationError(f"{name}: departures need {', '.join(missing)}")
         ratio = _without_noise(columns["airspeed_mps"], dt_s) / self.trim.airspeed_mps
         inputs = [columns[c] for c in self.base.inputs]
-        for column, power in self.scaled:
-            change = (ratio**power - 1.0) * _deviation(columns[column])
-            inputs.append(change if column in self.base.inputs else self._moving(change))
+        inputs += self._scaled_columns(columns, ratio)
         inputs += [self._moving(_deviation(rest)) for rest in self._nonlinear_rates(columns, ratio)]
         inputs += [_deviation(rest) for rest in self._nonlinear_forces(columns, ratio)]
         angle = _deviation(columns["alpha_rad"])
@@ -245,14 +252,24 @@ class VaryingModel:
         if AIRSPEED_TERMS[self.axis]:
             inputs.append(self._moving(ratio - 1.0))
         inputs += [self._moving(_deviation(columns[t.column])) for t in self.beside]
+        inputs += self._turning_columns(columns, dt_s)
+        outputs = np.column_stack([columns[y] for y in self.base.outputs])
+        return Maneuver(dt_s, np.column_stack(inputs), outputs, name=name)
+
+    def _scaled_columns(self, columns: Mapping[str, Array], ratio: Array) -> list[Array]:
+        """Return what airspeed changes of each column whose effect grows with it."""
+        found = []
+        for column, power in self.scaled:
+            change = (ratio**power - 1.0) * _deviation(columns[column])
+            found.append(change if column in self.base.inputs else self._moving(change))
+        return found
+
+    def _turning_columns(self, columns: Mapping[str, Array], dt_s: float) -> list[Array]:
+        """Return, per row that gusts turn, what the gust reckoned and steady ones do there."""
         gust, steady = gust_motion(columns, dt_s)
         motions = [gust, *(steady[:, :, k] for k in range(len(AXES)))]
         turns = [turning(columns, motion) for motion in motions]
-        inputs += [
-            self._moving(turn[row]) for row in GUST_TURNING_STATES[self.axis] for turn in turns
-        ]
-        outputs = np.column_stack([columns[y] for y in self.base.outputs])
-        return Maneuver(dt_s, np.column_stack(inputs), outputs, name=name)
+        return [self._moving(turn[row]) for row in GUST_TURNING_STATES[self.axis] for turn in turns]
 
     def _known(self) -> Array:
         """Return kinematics and gravity of the template."""

@@ -32,19 +32,10 @@ def model_lines(answer: Answer) -> list[str]:
         f"{answer.template} at {speed},"
         f" alpha {answer.trim.alpha_rad * DEG_PER_RAD:.1f} deg; value and 95 % half-width"
     ]
-    grades = {
-        r.name: r.grade for r in answer.identifiability_flags if not r.name.startswith("imu_")
-    }
     for k, name in enumerate(answer.model.parameter_names):
-        mark = f"  {grades[name]}" if name in grades else ""
-        mark += "  at its bound" if name in answer.at_bound else ""
         unit = parameter_unit(answer.model, name)
-        lines.append(
-            f"  {name:16s} {result.estimate[k]:11.5g}  +- {half[k]:9.3g}  {unit:7s}{mark}".rstrip()
-        )
-    for name, (value, width) in answer.delays.items():
-        mark = "  at its bound" if name in answer.at_bound else ""
-        lines.append(f"  {name:16s} {value:11.5g}  +- {width:9.3g}  s      {mark}".rstrip())
+        lines.append(_estimate_line(answer, name, float(result.estimate[k]), float(half[k]), unit))
+    lines += [_estimate_line(answer, name, *pair, "s") for name, pair in answer.delays.items()]
     lines += servo_estimate_lines(answer.servo)
     if answer.coefficients:
         lines.append(
@@ -69,6 +60,15 @@ def model_lines(answer: Answer) -> list[str]:
             )
             lines.append(f"  NRMSE ({kind}): {shares}")
     return lines
+
+
+def _estimate_line(answer: Answer, name: str, value: float, half: float, unit: str) -> str:
+    """Return one number with its half-width, and what speaks against it in a word."""
+    flags = answer.identifiability_flags
+    marks = [r.grade for r in flags if r.name == name and not name.startswith("imu_")]
+    marks += ["at its bound"] if name in answer.at_bound else []
+    text = f"  {name:16s} {value:11.5g}  +- {half:9.3g}  {unit:7s}"
+    return text.rstrip() if not marks else text + "".join(f"  {mark}" for mark in marks)
 
 
 def mode_lines(answer: Answer | CoefficientAnswer) -> list[str]:

@@ -53,18 +53,22 @@ def disagreements(answer: Answer, beside: Sequence[Answer]) -> dict[str, str]:
     beside : sequence of Answer
         Of any models and methods; those of the same model count.
     """
-    same = [a for a in beside if a.template == answer.template and a.result.converged]
-    same = [a for a in same if a.model.name == answer.model.name]
-    noise = noise_found([*same, answer])
-    others = [a for a in same if a is not answer and a.method != answer.method]
-    judges = [a for a in others if noise in _valid_in(_kind(a))]
     found: dict[str, str] = {}
-    for other in judges:
+    for other in _judges(answer, beside):
         for name in answer.model.parameter_names:
             if name not in found and name in other.result.names and _differ(answer, other, name):
                 value, theirs = answer.result.value(name), other.result.value(name)
                 found[name] = f"{other.method} says {theirs:.3g}, this method {value:.3g}"
     return found
+
+
+def _judges(answer: Answer, beside: Sequence[Answer]) -> list[Answer]:
+    """Return the answers by other methods to the same model that are valid in the noise found."""
+    same = [a for a in beside if a.template == answer.template and a.result.converged]
+    same = [a for a in same if a.model.name == answer.model.name]
+    noise = noise_found([*same, answer])
+    others = [a for a in same if a is not answer and a.method != answer.method]
+    return [a for a in others if noise in _valid_in(_kind(a))]
 
 
 def _kind(answer: Answer) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.state_space_model import LinearModel, Term
 
 MAIN_GAIN = 0.5  # of a parameter's largest gain in the outputs: with less it is a guest there
 
@@ -19,24 +19,25 @@ def leaning_on(model: LinearModel, signals: Collection[str]) -> set[str]:
         States, inputs or outputs. Of an output that is no state (an accelerometer) the parameters
         are those whose largest gain is there: D_alpha of ax, Z_alpha of az.
     """
-    rows = {k for k, name in enumerate(model.states) if name in signals}
-    columns = {k for k, name in enumerate(model.inputs) if name in signals}
-    outputs = {
-        k for k, name in enumerate(model.outputs) if name in signals and name not in model.states
-    }
     found = set()
     for term in model.terms:
-        if (term.matrix in "AB" and term.row in rows) or (
-            term.column in (rows if term.matrix in "AC" else columns)
-        ):
+        into, out_of = _ends(model, term)
+        own = term.matrix in "AB" or (into not in model.states and _is_main(model, term))
+        if out_of in signals or (into in signals and own):
             found.add(term.parameter)
-    return found | {
-        t.parameter
-        for t in model.terms
-        if t.matrix in "CD"
-        and t.row in outputs
-        and abs(t.gain) >= MAIN_GAIN * _largest(model, t.parameter)
-    }
+    return found
+
+
+def _ends(model: LinearModel, term: Term) -> tuple[str, str]:
+    """Return the state or output that a term makes, and the state or input that it multiplies."""
+    rows = model.states if term.matrix in "AB" else model.outputs
+    columns = model.states if term.matrix in "AC" else model.inputs
+    return rows[term.row], columns[term.column]
+
+
+def _is_main(model: LinearModel, term: Term) -> bool:
+    """Return whether an output has a good part of the largest gain of a parameter."""
+    return abs(term.gain) >= MAIN_GAIN * _largest(model, term.parameter)
 
 
 def _largest(model: LinearModel, name: str) -> float:

@@ -33,26 +33,29 @@ def prior_lines(tables: Sequence[CoefficientTable], prior: PriorTable) -> list[s
             f"prior: none of its coefficients ({', '.join(prior.points)}) is in the answer, which"
             f" has {', '.join(sorted(names)) or 'none'}",
         ]
-    for table in tables:
-        expected = prior.at(table.alpha_rad)
-        shared = [c for c in table.coefficients if c.name in expected]
-        if not shared:
-            continue
-        place = _place(prior, float(np.degrees(table.alpha_rad)))
-        lines += [f"{table.template}, {table.method}" + (f": prior {place}" if place else "")]
-        apart = set(half_turned(prior.points)) & {c.name for c in shared}
-        if prior.stability_axes and apart:
-            lines.append(
-                f"not or not wholly turned, what they turn with is not in the prior:"
-                f" {', '.join(sorted(apart))}"
-            )
-        widths = "".join(f" {name:>10s}" for name in ("95 %", "together", "95 %"))
+    return [*lines, *(line for table in tables for line in _table_lines(table, prior))]
+
+
+def _table_lines(table: CoefficientTable, prior: PriorTable) -> list[str]:
+    """Return one table beside its prior; nothing where they share no coefficient."""
+    expected = prior.at(table.alpha_rad)
+    shared = [c for c in table.coefficients if c.name in expected]
+    if not shared:
+        return []
+    place = _place(prior, float(np.degrees(table.alpha_rad)))
+    lines = [f"{table.template}, {table.method}" + (f": prior {place}" if place else "")]
+    apart = set(half_turned(prior.points)) & {c.name for c in shared}
+    if prior.stability_axes and apart:
         lines.append(
-            f"{'coefficient':12s} {'identified':>12s} {'95 %':>10s} {'prior':>10s}"
-            + (widths if prior.half_widths else "")
+            f"not or not wholly turned, what they turn with is not in the prior:"
+            f" {', '.join(sorted(apart))}"
         )
-        lines += [_line(c, expected[c.name], prior) for c in shared]
-    return lines
+    widths = "".join(f" {name:>10s}" for name in ("95 %", "together", "95 %"))
+    lines.append(
+        f"{'coefficient':12s} {'identified':>12s} {'95 %':>10s} {'prior':>10s}"
+        + (widths if prior.half_widths else "")
+    )
+    return [*lines, *(_line(c, expected[c.name], prior) for c in shared)]
 
 
 def _line(c: Coefficient, expected: float, prior: PriorTable) -> str:

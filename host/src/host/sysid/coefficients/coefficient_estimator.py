@@ -223,12 +223,7 @@ class CoefficientEstimator:
                 f"coefficients need more than the {SETTLED_S:.0f} s after the launch, which are"
                 " left out; the flight ends before"
             )
-        found = [
-            f
-            for f in flight.maneuvers
-            if f.axis != "throttle" and f.end_s - f.start_s + LEAD_S >= SHORTEST_S
-            and t[0] <= f.start_s - (0.0 if f.given else LEAD_S) and f.end_s <= t[-1]
-        ]  # fmt: skip
+        found = [f for f in flight.maneuvers if _fits_in(f, t)]
         spans = [replace(w, first_s=max(w.first_s, float(t[0]))) for w in merged_windows(found)]
         terms = flight_terms(
             self.model, {k: v[flying] for k, v in columns.items()}, spans, self.powerplant
@@ -247,6 +242,14 @@ class CoefficientEstimator:
         used = tuple(f for f in found if (f.axis == "elevator_rad") in axes)
         remarks = (*terms.remarks, *_moving_air(search))
         return CoefficientEstimate(search, used, terms.windows, remarks)
+
+
+def _fits_in(found: DetectedManeuver, t: Array) -> bool:
+    """Return whether a maneuver of a surface, its trim before it, lies in a record's time."""
+    first_s = found.start_s - (0.0 if found.given else LEAD_S)
+    long_enough = found.end_s - found.start_s + LEAD_S >= SHORTEST_S
+    inside = t[0] <= first_s and found.end_s <= t[-1]
+    return found.axis != "throttle" and long_enough and bool(inside)
 
 
 def coefficient_estimator(

@@ -7,6 +7,7 @@ AVL or Datcom say; what is known of the aircraft widens the intervals
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -116,11 +117,7 @@ def convert(path: Path, aircraft: str, at: FlightCondition) -> Conversion:
         table = read_prior(path, speed)  # AVL, Datcom, or a table over the angle of attack
         values = {name: (value, 0.0) for name, value in table.at(alpha).items()}
     given = {n: v for n, v in values.items() if n in OTHER}
-    dimensional = given.keys() & set(DERIVATIVES)
-    if dimensional and len(dimensional) < len(given):
-        raise IdentificationError(f"{path}: both derivatives and coefficients, expected one kind")
-    if not given:
-        raise IdentificationError(f"{path}: nothing to convert; expected {EXPECTED}")
+    dimensional = _dimensional(path, given)
     quantities = Quantities(
         tuple(given),
         np.array([value for value, _ in given.values()]),
@@ -134,11 +131,21 @@ def convert(path: Path, aircraft: str, at: FlightCondition) -> Conversion:
         airspeed_mps=speed,
         alpha_rad=alpha,
         density_kgpm3=at.density_kgpm3,
-        dimensional=bool(dimensional),
+        dimensional=dimensional,
         given=quantities,
         found=turn(quantities, place, consider_deviations(airframe, instrument)),
         left_out=tuple(n for n in values if n not in given),
     )
+
+
+def _dimensional(path: Path, given: Collection[str]) -> bool:
+    """Return whether names are those of derivatives; refuse both kinds in one file, and none."""
+    dimensional = [n for n in given if n in DERIVATIVES]
+    if dimensional and len(dimensional) < len(given):
+        raise IdentificationError(f"{path}: both derivatives and coefficients, expected one kind")
+    if not given:
+        raise IdentificationError(f"{path}: nothing to convert; expected {EXPECTED}")
+    return bool(dimensional)
 
 
 def _from_toml(path: Path) -> tuple[dict[str, tuple[float, float]], Trim | None]:

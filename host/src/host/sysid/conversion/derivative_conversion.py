@@ -127,21 +127,14 @@ def to_derivatives(
     Parameters
     ----------
     coefficients : Quantities
-        CL_alpha, Cm_q, Cl_p ...; names of `CONSIDERED_ERRORS` among them are consider
-        parameters, correlated with the others by the covariance. Other names are left out.
+        CL_alpha, Cm_q, Cl_p ...; the rest as in `to_coefficients`, errors too.
     point : ConversionPoint
     errors : mapping
-        As in `to_coefficients`.
 
     Returns
     -------
     Quantities
         Derivatives in the order of the coefficients, then the errors.
-
-    Raises
-    ------
-    IdentificationError
-        If there is nothing to convert, or an error is not one of these.
     """
 
     def convert(values: Table) -> Table:
