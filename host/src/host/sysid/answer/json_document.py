@@ -19,6 +19,7 @@ from host.sysid.flight.reconstructed_flight import maneuver_name
 from host.sysid.linear.linear_answer import Answer
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.maneuvers.maneuver_grade import Grade
+from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.model_constants import known_constants
 from host.sysid.models.parameter_units import parameter_unit
@@ -79,12 +80,66 @@ def mode_document(modes: Sequence[Mode]) -> list[dict[str, Any]]:
     ]
 
 
+def _parameter_document(answer: Answer) -> dict[str, Any]:
+    """Return every parameter with its half-width, unit and what widens it."""
+    result, half = answer.result, answer.result.half_width()
+    return {
+        name: {
+            "value": float(result.estimate[k]),
+            "half_width": float(half[k]),
+            "unit": parameter_unit(answer.model, name),
+            "widened_by": answer.causes.get(name, ""),
+        }
+        for k, name in enumerate(result.names)
+    }
+
+
+def _flag_document(answer: Answer) -> list[dict[str, Any]]:
+    """Return the parameters that the data hardly tell, and why."""
+    return [
+        {
+            "name": r.name,
+            "grade": r.grade,
+            "probability": r.probability,
+            "relative_bound": r.relative_bound,
+            "reason": r.reason,
+        }
+        for r in answer.identifiability_flags
+    ]
+
+
+def _converted_document(answer: Answer, verdict: Verdict) -> dict[str, Any]:
+    """Return the coefficients that derivatives became, each with its mark."""
+    converted = converted_marks(answer, verdict.marks)
+    return {
+        c.name: {
+            "value": c.value,
+            "half_width": c.half_width,
+            "fit_error": c.fit_error,
+            "mark": converted.get(c.name, ""),
+        }
+        for c in answer.coefficients
+    }
+
+
+def _fit_document(fits: Sequence[SignalFit]) -> dict[str, Any]:
+    """Return the figures of fit of every output."""
+    return {
+        f.name: {
+            "r_squared": f.r_squared,
+            "nrmse": f.nrmse,
+            "theil": f.theil,
+            "autocorrelation_outside": f.autocorrelation_outside,
+            "ljung_box_p": f.ljung_box_p,
+        }
+        for f in fits
+    }
+
+
 def answer_document(answer: Answer, lines: Sequence[str], verdict: Verdict) -> dict[str, Any]:
     """Return one fitted model: verdict, estimates with intervals, modes, figures of fit."""
     result = answer.result
-    half = result.half_width()
     A, B, C, D = result.matrices()
-    converted = converted_marks(answer, verdict.marks)
     return {
         "template": answer.template,
         "method": result.method,
@@ -102,15 +157,7 @@ def answer_document(answer: Answer, lines: Sequence[str], verdict: Verdict) -> d
         "B": B.tolist(),
         "C": C.tolist(),
         "D": D.tolist(),
-        "parameters": {
-            name: {
-                "value": float(result.estimate[k]),
-                "half_width": float(half[k]),
-                "unit": parameter_unit(answer.model, name),
-                "widened_by": answer.causes.get(name, ""),
-            }
-            for k, name in enumerate(result.names)
-        },
+        "parameters": _parameter_document(answer),
         "known_constants": known_constants(answer.model),
         "delays_s": {
             name: {"value": value, "half_width": width}
@@ -120,39 +167,13 @@ def answer_document(answer: Answer, lines: Sequence[str], verdict: Verdict) -> d
         "at_bound": list(answer.at_bound),
         "unpredicted": list(unpredicted_states(answer)),
         "corrections": correction_document(answer.corrections),
-        "refused": [
-            {
-                "name": r.name,
-                "grade": r.grade,
-                "probability": r.probability,
-                "relative_bound": r.relative_bound,
-                "reason": r.reason,
-            }
-            for r in answer.identifiability_flags
-        ],
-        "coefficients": {
-            c.name: {
-                "value": c.value,
-                "half_width": c.half_width,
-                "fit_error": c.fit_error,
-                "mark": converted.get(c.name, ""),
-            }
-            for c in answer.coefficients
-        },
+        "refused": _flag_document(answer),
+        "coefficients": _converted_document(answer, verdict),
         "modes": mode_document(answer.modes),
         "settling": settling_document(answer),
         "fit": {
-            kind: {
-                f.name: {
-                    "r_squared": f.r_squared,
-                    "nrmse": f.nrmse,
-                    "theil": f.theil,
-                    "autocorrelation_outside": f.autocorrelation_outside,
-                    "ljung_box_p": f.ljung_box_p,
-                }
-                for f in fits
-            }
-            for kind, fits in (("fitted", answer.fits), ("held_out", answer.validation))
+            "fitted": _fit_document(answer.fits),
+            "held_out": _fit_document(answer.validation),
         },
         "predictions": {
             name: {"nrmse": p.nrmse, "largest": p.largest, "holds": p.holds}
