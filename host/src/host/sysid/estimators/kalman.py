@@ -178,12 +178,7 @@ def fit_jointly(
         check_shapes(model, maneuver)
     n, q = len(model.states), len(model.parameters)
     deviation = noise_deviation(maneuvers) if noise is None else np.asarray(noise)
-    spread = np.array(
-        [
-            np.std(maneuvers[0].outputs[:, model.outputs.index(s)]) if s in model.outputs else 1.0
-            for s in model.states
-        ]
-    )
+    spread = np.array([measured_spread(model, maneuvers[0], s, 1.0) for s in model.states])
     intensity = PROCESS_SHARE * spread if process is None else np.asarray(process)
     locals_ = [f"bias_rate.{s}" for s in model.state_biases]
     locals_ += [f"bias.{y}" for y in model.output_biases]
@@ -208,16 +203,7 @@ def fit_jointly(
         P[n : n + q, n : n + q] = np.diag(spread_first**2)
         residuals, white = [], []
         for maneuver in maneuvers:
-            for k, state in enumerate(model.states):
-                is_measured = state in model.outputs
-                joint[k] = maneuver.outputs[0, model.outputs.index(state)] if is_measured else 0.0
-                P[k, :] = P[:, k] = 0.0
-                known = deviation[model.outputs.index(state)] if is_measured else spread[k]
-                P[k, k] = (3.0 * known) ** 2
-            for k in range(n + q, size):
-                joint[k] = 0.0
-                P[k, :] = P[:, k] = 0.0
-                P[k, k] = _bias_variance(model, maneuver, k - n - q)
+            _begin_record(filter_, maneuver, spread, joint, P)
             joint, P, e, whitened = filter_pass(filter_, maneuver, joint, P)
             if not np.isfinite(joint).all():
                 raise IdentificationError(
@@ -273,6 +259,32 @@ def filter_result(
         warnings=inflation_lines(excess),
         details={**details, "innovation_inflation": excess},
     )
+
+
+def measured_spread(model: LinearModel, maneuver: Maneuver, state: str, unmeasured: float) -> float:
+    """Return the deviation of a state over a maneuver where an output is that state."""
+    if state not in model.outputs:
+        return unmeasured
+    return float(np.std(maneuver.outputs[:, model.outputs.index(state)]))
+
+
+def _begin_record(
+    filter_: JointFilter, maneuver: Maneuver, spread: Array, joint: Array, P: Array
+) -> None:
+    """Write states and biases before a maneuver's first sample, and their covariance."""
+    model, n, deviation = filter_.model, filter_.n_states, np.sqrt(np.diag(filter_.R))
+    biases = range(n + len(model.parameters), len(joint))
+    for k in (*range(n), *biases):
+        joint[k] = 0.0
+        P[k, :] = P[:, k] = 0.0
+    for k, state in enumerate(model.states):
+        known = spread[k]
+        if state in model.outputs:
+            output = model.outputs.index(state)
+            joint[k], known = maneuver.outputs[0, output], deviation[output]
+        P[k, k] = (3.0 * known) ** 2
+    for number, k in enumerate(biases):
+        P[k, k] = _bias_variance(model, maneuver, number)
 
 
 def _bias_variance(model: LinearModel, maneuver: Maneuver, k: int) -> float:

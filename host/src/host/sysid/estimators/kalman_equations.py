@@ -15,6 +15,7 @@ from host.sysid.estimators.kalman import (
     change_by_priors,
     filter_result,
     filtered,
+    measured_spread,
     noise_deviation,
 )
 from host.sysid.models.fit_result import FitResult
@@ -65,12 +66,7 @@ def fit_extended_equations(
     guess = problem.first_guess()
     problem.check_start(guess)
     deviation = noise_deviation(maneuvers) if noise is None else np.asarray(noise)
-    spread = np.array(
-        [
-            np.std(maneuvers[0].outputs[:, model.outputs.index(s)]) if s in model.outputs else 0.0
-            for s in model.states
-        ]
-    )
+    spread = np.array([measured_spread(model, maneuvers[0], s, 0.0) for s in model.states])
     intensity = (PROCESS_SHARE * spread if process is None else np.asarray(process)) ** 2
     shared = began = guess[:common]
     residuals: list[Array] = []

@@ -9,8 +9,9 @@ speed). Biases b and c and the initial state x0 belong to one maneuver; everythi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
@@ -174,11 +175,18 @@ class LinearModel:
                     f"model {self.name}: {label} is {array.shape}, expected {shape}"
                 )
             object.__setattr__(self, label, array)
-        names = [parameter.name for parameter in self.parameters]
+        names = tuple(parameter.name for parameter in self.parameters)
         for group in (self.states, self.inputs, self.outputs, names):
             if len(set(group)) < len(group):
                 twice = sorted({x for x in group if list(group).count(x) > 1})
                 raise IdentificationError(f"model {self.name}: {', '.join(twice)} named twice")
+        self._check_terms(names, shapes)
+        self._check_references(names)
+        if self.hold not in ("zoh", "foh"):
+            raise IdentificationError(f"model {self.name}: hold '{self.hold}', use zoh or foh")
+
+    def _check_terms(self, names: Sequence[str], shapes: Mapping[str, tuple[int, int]]) -> None:
+        """Raise where an entry has no parameter or no place, or a parameter enters nowhere."""
         for term in self.terms:
             if term.matrix not in shapes or term.parameter not in names:
                 raise IdentificationError(
@@ -199,17 +207,22 @@ class LinearModel:
         )
         if unused:
             raise IdentificationError(f"model {self.name}: {', '.join(unused)} enters no matrix")
+
+    def _check_references(self, names: tuple[str, ...]) -> None:
+        """Raise where a bias, start, noise, lever or delay is of no signal of the model."""
+        started, shared = zip(*self.shared_starts, strict=True) if self.shared_starts else ((), ())
+        levers = self.accelerometer_offsets
         for what, chosen, known in (
             ("state bias", self.state_biases, self.states),
             ("initial state", self.initial_states, self.states),
             ("initial state", tuple(x for x, _ in self.known_starts), self.states),
-            ("initial state", tuple(x for x, _ in self.shared_starts), self.states),
-            ("initial state", tuple(p for _, p in self.shared_starts), tuple(names)),
+            ("initial state", started, self.states),
+            ("initial state", shared, names),
             ("noise", tuple(x for x, _ in self.known_noise), self.outputs),
             ("output bias", self.output_biases, self.outputs),
-            ("lever", tuple(x.output for x in self.accelerometer_offsets), self.outputs),
-            ("lever", tuple(x.state for x in self.accelerometer_offsets), self.states),
-            ("lever", tuple(x.parameter for x in self.accelerometer_offsets), tuple(names)),
+            ("lever", tuple(x.output for x in levers), self.outputs),
+            ("lever", tuple(x.state for x in levers), self.states),
+            ("lever", tuple(x.parameter for x in levers), names),
             ("delay", tuple(y for d in self.delays for y in d.outputs), self.delayed_signals()),
         ):
             unknown = [x for x in chosen if x not in known]
@@ -218,8 +231,6 @@ class LinearModel:
                     f"model {self.name}: {what} on {', '.join(unknown)}, known are"
                     f" {', '.join(known)}"
                 )
-        if self.hold not in ("zoh", "foh"):
-            raise IdentificationError(f"model {self.name}: hold '{self.hold}', use zoh or foh")
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
@@ -371,10 +382,22 @@ def free_model(
     )
 
 
+def _kept(
+    terms: Sequence[Term], matrices: str, along: Literal["row", "column"], keep: Sequence[int]
+) -> Iterator[Term]:
+    """Return the entries that stay where of two matrices these rows or columns are kept."""
+    for term in terms:
+        old = term.row if along == "row" else term.column
+        if term.matrix not in matrices:
+            yield term
+        elif old in keep:
+            new = keep.index(old)
+            yield replace(term, row=new) if along == "row" else replace(term, column=new)
+
+
 def without_outputs(model: LinearModel, names: Sequence[str]) -> LinearModel:
     """Return a model without some of its outputs; delays without outputs are removed too."""
     keep = [k for k, y in enumerate(model.outputs) if y not in names]
-    place = {old: new for new, old in enumerate(keep)}
     delays = [
         replace(d, outputs=tuple(y for y in d.outputs if y not in names)) for d in model.delays
     ]
@@ -385,11 +408,7 @@ def without_outputs(model: LinearModel, names: Sequence[str]) -> LinearModel:
         outputs=tuple(model.outputs[k] for k in keep),
         C=model.C[keep],
         D=model.D[keep],
-        terms=tuple(
-            replace(t, row=place[t.row]) if t.matrix in "CD" else t
-            for t in model.terms
-            if t.matrix in "AB" or t.row in place
-        ),
+        terms=tuple(_kept(model.terms, "CD", "row", keep)),
         parameters=tuple(p for p in model.parameters if p.name not in lost),
         output_biases=tuple(y for y in model.output_biases if y not in names),
         known_noise=tuple((y, sd) for y, sd in model.known_noise if y not in names),
@@ -401,12 +420,7 @@ def without_outputs(model: LinearModel, names: Sequence[str]) -> LinearModel:
 def without_inputs(model: LinearModel, names: Sequence[str]) -> LinearModel:
     """Return a model without some of its inputs and the parameters that only these have."""
     keep = [k for k, u in enumerate(model.inputs) if u not in names]
-    place = {old: new for new, old in enumerate(keep)}
-    terms = tuple(
-        replace(t, column=place[t.column]) if t.matrix in "BD" else t
-        for t in model.terms
-        if t.matrix in "AC" or t.column in place
-    )
+    terms = tuple(_kept(model.terms, "BD", "column", keep))
     left = {t.parameter for t in terms} | {x.parameter for x in model.accelerometer_offsets}
     left |= {parameter for _, parameter in model.shared_starts}
     return replace(
