@@ -15,7 +15,9 @@ def add_log_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SOURCE",
         help="log, folder or mounted card; the newest flight of the working folder without it",
     )
-    parser.add_argument("--session", type=int, metavar="N", help="one recording session only")
+    parser.add_argument("--flight", "--session", dest="session", type=int, metavar="N",
+                        help="one flight of several in a log, as `host info` lists them; of our own"
+                        " logs one recording session")  # fmt: skip
     parser.add_argument(
         "--file-id",
         type=hexadecimal,
@@ -27,6 +29,16 @@ def add_log_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_sensor(parser)
     add_row_rate(parser)
+
+
+def add_flight(parser: argparse.ArgumentParser, *, every: bool = False) -> None:
+    """Add the choice among the flights of a log; `every` where several are fitted jointly."""
+    from host.readers.flight_choice import flight_argument
+
+    more = ", or 'all', fitted together" if every else ""
+    parser.add_argument("--flight", "--session", type=flight_argument if every else int,
+                        metavar="N", help="flight N of a log with several, as `host info` lists"
+                        f" them{more}; that with the longest time in the air without")  # fmt: skip
 
 
 def add_sensor(parser: argparse.ArgumentParser) -> None:

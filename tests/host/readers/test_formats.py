@@ -103,7 +103,7 @@ def test_tlog_is_what_mavutil_reads(tmp_path: Path) -> None:
         theirs[message.get_type()] = theirs.get(message.get_type(), 0) + 1
     link.close()
     assert "BAD_DATA" not in theirs
-    ours = read_tlog(path)
+    (ours,) = read_tlog(path)
     assert not ours.damage
     for name, messages in ours.messages.items():
         assert len(messages[0]) == theirs[name]

@@ -67,7 +67,7 @@ def slower(messages: Messages, every: int) -> dict[int, Messages]:
 
 @pytest.fixture(scope="module")
 def px4(tmp_path_factory: pytest.TempPathFactory) -> AutopilotLog:
-    return read_messages(write("ulog", tmp_path_factory.mktemp("px4")))
+    return read_messages(write("ulog", tmp_path_factory.mktemp("px4")))[0]
 
 
 def test_outputs_at_10_hz_name_the_parameter(px4: AutopilotLog) -> None:

@@ -46,7 +46,7 @@ def _frames(seed: int, *, v1: bool = False, signed: bool = False) -> list[bytes]
 
 def _read(path: Path, data: bytes) -> AutopilotLog:
     path.write_bytes(data)
-    return read_tlog(path)
+    return read_tlog(path)[0]
 
 
 def _same(one: AutopilotLog, other: AutopilotLog) -> None:

@@ -110,7 +110,7 @@ def decode(request: Request) -> Decoded:
 
 def decode_rows(request: Request, path: Path) -> Decoded:
     """Decode a file of the original ASCII rows and write its table."""
-    for name, value in (("session", request.session), ("file-id", request.file_id)):
+    for name, value in (("flight", request.session), ("file-id", request.file_id)):
         if value is not None:
             raise UsageError(f"{path}: original ASCII rows have no --{name}")
     if request.frames:
@@ -141,21 +141,22 @@ def decode_autopilot(request: Request, path: Path) -> Decoded:
         If an option is for logs of ours.
     """
     asked = {
-        "session": request.session, "file-id": request.file_id, "row-rate": request.row_rate_hz,
+        "file-id": request.file_id, "row-rate": request.row_rate_hz,
         "calibration": request.calibration, "frames": request.frames or None,
     }  # fmt: skip
     for name, value in asked.items():
         if value is not None:
             raise UsageError(f"{path}: a log of an autopilot has no --{name}")
     kind, target = destination(request, path)
-    flight = read_autopilot(path, dict(request.sensors))
+    flight = read_autopilot(path, dict(request.sensors), request.session)
     summary = finite(summarise_autopilot(flight))
     columns = flight.columns()
     if columns:
         write_table([columns], kind, target, autopilot_meta(summary))
     summary["files"] = [str(target)] if columns else []
     verb = "info" if flight.judgement.refusal else "maneuvers"
-    summary["next"] = command_line("host", verb, path)
+    which = () if request.session is None else ("--flight", str(request.session))
+    summary["next"] = command_line("host", verb, path, *which)
     said = [*summary_lines(summary), *(f"{'wrote':<13}{name}" for name in summary["files"])]
     said.append(f"{'next':<13}{summary['next']}")
     return Decoded(summary, said)

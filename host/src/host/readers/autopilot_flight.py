@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,12 @@ from host.arrays import Array
 from host.files.regular import regular_file
 from host.readers.airborne import Airborne, airborne
 from host.readers.ardupilot_channels import ardupilot_channels
-from host.readers.autopilot_log import AutopilotLog, NothingToIdentifyError, SensorChoiceError
+from host.readers.autopilot_log import (
+    AutopilotLog,
+    FlightChoiceError,
+    NothingToIdentifyError,
+    SensorChoiceError,
+)
 from host.readers.flown_tests import flown_tests
 from host.readers.held_outputs import held_output
 from host.readers.judgement import Judgement, judge
@@ -27,6 +32,36 @@ CLOCK_SHARE = 5e-5  # one deviation of a crystal of 50 ppm
 
 
 @dataclass(frozen=True, slots=True)
+class FlightLine:
+    """One flight of a log with several.
+
+    Attributes
+    ----------
+    number : int
+        From 1, in order of the log; what ``--flight`` takes.
+    start_s, length_s, airborne_s : float
+        By the clock of its own start.
+    fastest_mps : float
+        NaN where nothing measured it.
+    """
+
+    number: int
+    start_s: float
+    length_s: float
+    airborne_s: float
+    fastest_mps: float
+
+    @property
+    def text(self) -> str:
+        """The line in words."""
+        speed = "" if np.isnan(self.fastest_mps) else f", up to {self.fastest_mps:.1f} m/s"
+        return (
+            f"flight {self.number}: from {self.start_s:.1f} s, {self.length_s:.0f} s long,"
+            f" {self.airborne_s:.0f} s in the air{speed}"
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class AutopilotFlight:
     """One log.
 
@@ -36,12 +71,18 @@ class AutopilotFlight:
     channels : Channels
     flown : Airborne
     judgement : Judgement
+    number : int
+        Of the flight in its file, from 1.
+    listed : tuple of FlightLine
+        All flights of the file, where there are several.
     """
 
     log: AutopilotLog
     channels: Channels
     flown: Airborne
     judgement: Judgement
+    number: int = 1
+    listed: tuple[FlightLine, ...] = ()
 
     @property
     def shares(self) -> tuple[str, ...]:
@@ -89,10 +130,22 @@ class AutopilotFlight:
             result[f"{name}_share" if name in SURFACES else name] = column
         return result
 
+    @property
+    def choice(self) -> str:
+        """Which flight of several this is, in words; empty of a log with one."""
+        if not self.listed:
+            return ""
+        others = ", ".join(one.text for one in self.listed if one.number != self.number)
+        return (
+            f"{self.listed[self.number - 1].text}: used, of {len(self.listed)} in this log"
+            f" ({others}); --flight takes another"
+        )
+
     def notes(self) -> list[str]:
         """Return lines on chosen sensors, on outputs that became surfaces, and on damage."""
         log = self.log
-        said = [f"damaged: {one}" for one in log.damage]
+        said = [self.choice] if self.listed else []
+        said += [f"damaged: {one}" for one in log.damage]
         said.append("; ".join(self.judgement.lines[:1]))
         said += self.channels.notes
         said += [f"the autopilot's own test: {test.line}" for test in flown_tests(log)]
@@ -110,7 +163,9 @@ def is_autopilot_log(path: Path) -> bool:
     return path.is_file() and format_of_file(path) is not None
 
 
-def read_autopilot(path: Path, sensors: Mapping[str, int] | None = None) -> AutopilotFlight:
+def read_autopilot(
+    path: Path, sensors: Mapping[str, int] | None = None, flight: int | None = None
+) -> AutopilotFlight:
     """Read a log of an autopilot.
 
     Parameters
@@ -118,20 +173,42 @@ def read_autopilot(path: Path, sensors: Mapping[str, int] | None = None) -> Auto
     path : Path
     sensors : mapping of str to int, optional
         Instance to use of a message, in place of the one with most messages.
+    flight : int, optional
+        Which flight of it, from 1; that with the longest time in the air without.
 
     Raises
     ------
     NotAutopilotLogError
         If it is none, or holds nothing.
-    SensorChoiceError
-        If it has no such instance.
+    SensorChoiceError, FlightChoiceError
+        If it has no such instance, or flight.
     UsageError
         If an extra is missing.
     """
-    log = read_messages(regular_file(path))
-    channels, not_flying = _channels(log, dict(sensors or {}))
+    logs = read_messages(regular_file(path))
+    if flight is not None and not 1 <= flight <= len(logs):
+        raise FlightChoiceError(f"{path}: no flight {flight}; it has 1 to {len(logs)}")
+    if len(logs) == 1:
+        return _flight(logs[0], dict(sensors or {}))
+    every = [_flight(log, {}) for log in logs]
+    best = max(range(len(every)), key=lambda k: every[k].flown.time_s)
+    chosen = best if flight is None else flight - 1
+    found = _flight(logs[chosen], dict(sensors)) if sensors else every[chosen]
+    listed = tuple(_line(number, one) for number, one in enumerate(every, start=1))
+    return replace(found, number=chosen + 1, listed=listed)
+
+
+def _flight(log: AutopilotLog, sensors: Mapping[str, int]) -> AutopilotFlight:
+    channels, not_flying = _channels(log, sensors)
+    channels.notes[:0] = log.remarks
     flown = airborne(channels, not_flying)
     return AutopilotFlight(log, channels, flown, judge(log, channels, flown))
+
+
+def _line(number: int, one: AutopilotFlight) -> FlightLine:
+    ends = [s.t_s[k] for s in one.channels.signals.values() for k in (0, -1)]
+    first, last = (float(min(ends)), float(max(ends))) if ends else (0.0, 0.0)
+    return FlightLine(number, first, last - first, one.flown.time_s, one.flown.fastest_mps)
 
 
 def _channels(log: AutopilotLog, sensors: Mapping[str, int]) -> tuple[Channels, list[Signal]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,10 @@ class NotAutopilotLogError(NotALogError):
 
 class SensorChoiceError(UsageError):
     """An instance that the log does not have."""
+
+
+class FlightChoiceError(UsageError):
+    """A flight that the log does not have."""
 
 
 class NothingToIdentifyError(CheckError):
@@ -74,6 +78,10 @@ class AutopilotLog:
         A sentence for each loss, error or unproven range.
     lost : int
         Ranges of the file that were lost.
+    texts : tuple of str
+        As the autopilot said them.
+    remarks : tuple of str
+        Lines on clocks and senders: what was taken of what the log has twice.
     """
 
     path: Path
@@ -85,7 +93,8 @@ class AutopilotLog:
     parameters: Mapping[str, float]
     damage: tuple[str, ...] = ()
     lost: int = 0
-    texts: tuple[str, ...] = field(default_factory=tuple)
+    texts: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     def first(self, *names: str) -> Messages | None:
         """Return the messages of the first of these names that is there, lowest instance."""

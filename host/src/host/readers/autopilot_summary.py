@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 from host.export.writer import Meta
@@ -34,7 +35,9 @@ def summarise_autopilot(flight: AutopilotFlight) -> dict[str, Any]:
         "judgement": judgement.document(),
         "lines": judgement.lines,
         "table": judgement.table(),
-        "notes": flight.channels.notes,
+        "notes": list(flight.channels.notes),
+        "flight": flight.number,
+        "flights": [{**asdict(one), "text": one.text} for one in flight.listed],
     }
 
 
@@ -47,6 +50,15 @@ def summary_lines(summary: dict[str, Any]) -> list[str]:
         f"{'vehicle':<13}{summary['lines'][0]}",
     ]
     out += [f"{'':<13}{line}" for line in summary["lines"][1:]]
+    for one in summary["flights"]:
+        many = one.get("maneuvers")
+        found = "" if many is None else f", {many} maneuvers"
+        used = (
+            " (described here; --flight takes another)"
+            if one["number"] == summary["flight"]
+            else ""
+        )
+        out.append(f"{'':<13}{one['text']}{found}{used}")
     out += [f"{'note':<13}{note}" for note in summary["notes"]]
     refusal = summary["judgement"]["refusal"]
     if refusal:

@@ -10,7 +10,9 @@ from host.readers.autopilot_flight import CLOCK_SHARE, read_autopilot
 from host.readers.foreign_tables import Foreign
 
 
-def autopilot_table(source: Path, sensors: Mapping[str, int] | None) -> Foreign:
+def autopilot_table(
+    source: Path, sensors: Mapping[str, int] | None, flight: int | None = None
+) -> Foreign:
     """Return the columns of a log of PX4 or ArduPilot.
 
     Surfaces are commands: shares of full travel under the names of angles, so that one is full
@@ -22,16 +24,16 @@ def autopilot_table(source: Path, sensors: Mapping[str, int] | None) -> Foreign:
     host.errors.HostError
         If it cannot be read, or nothing can be identified of it.
     """
-    flight = read_autopilot(source, sensors)
-    flight.refuse()
-    columns = flight.columns()
-    shares = flight.shares
+    read = read_autopilot(source, sensors, flight)
+    read.refuse()
+    columns = read.columns()
+    shares = read.shares
     columns |= {f"{name}_rad": columns[f"{name}_share"] for name in shares}
     commanded = tuple(name for name in SURFACES if name in shares)
     return Foreign(
         columns,
-        notes=flight.notes(),
-        recording=Recording(commanded, CLOCK_SHARE, AUTOPILOT, flight.imu_lag_s),
+        notes=read.notes(),
+        recording=Recording(commanded, CLOCK_SHARE, AUTOPILOT, read.imu_lag_s),
         shares=shares,
-        slow_outputs=flight.undersampled(),
+        slow_outputs=read.undersampled(),
     )

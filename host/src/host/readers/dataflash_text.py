@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from host.arrays import IntArray
 from host.export.dataflash_layout import FIELDS
 
 _LONGEST_LINE = 1024
@@ -17,9 +18,10 @@ _LONGEST_LINE = 1024
 
 @dataclass(frozen=True, slots=True)
 class TextRecords:
-    """The fields of all records by kind, and how many lines were none."""
+    """The fields of all records by kind, the line of each, and how many lines were none."""
 
     tables: dict[str, dict[str, NDArray[Any]]]
+    lines: dict[str, IntArray]
     bad_lines: int
 
 
@@ -27,26 +29,30 @@ def read_text_records(path: Path, wanted: Collection[str]) -> TextRecords:
     """Read the records of the wanted kinds; numbers are already scaled in this form."""
     layouts: dict[str, tuple[str, list[str]]] = {}
     rows: dict[str, list[list[float | str]]] = {}
+    places: dict[str, list[int]] = {}
     bad = 0
     with path.open(encoding="utf-8", errors="replace") as file:
-        for line in iter(lambda: file.readline(_LONGEST_LINE), ""):
+        for number, line in enumerate(iter(lambda: file.readline(_LONGEST_LINE), "")):
             parts = [part.strip() for part in line.rstrip("\r\n").split(",")]
             name = parts[0]
             if name == "FMT" and len(parts) > 5:
-                layouts[parts[3]] = parts[4], parts[5:]
+                # Of two definitions the first counts: a script's rows are then no records.
+                layouts.setdefault(parts[3], (parts[4], parts[5:]))
             elif name in wanted:
                 row = _row(parts[1:], *layouts.get(name, ("", [])))
                 bad += row is None
                 if row is not None:
                     rows.setdefault(name, []).append(row)
+                    places.setdefault(name, []).append(number)
             elif name and name not in layouts:
                 bad += 1
     tables = {}
     for name, found in rows.items():
         _, columns = layouts[name]
-        by_column = zip(*(row for row in found if len(row) == len(columns)), strict=True)
+        by_column = zip(*found, strict=True)
         tables[name] = {c: np.array(v) for c, v in zip(columns, by_column, strict=True)}
-    return TextRecords(tables, bad)
+    lines = {name: np.array(every, dtype=np.int64) for name, every in places.items()}
+    return TextRecords(tables, lines, bad)
 
 
 def _row(parts: list[str], letters: str, columns: list[str]) -> list[float | str] | None:

@@ -51,8 +51,8 @@ def _looks_like_tlog(head: bytes) -> bool:
     return seen == 2
 
 
-def read_messages(path: Path) -> AutopilotLog:
-    """Read the messages of a log by its format.
+def read_messages(path: Path) -> list[AutopilotLog]:
+    """Read the messages of a log by its format: of each start of the autopilot's clock a log.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def read_messages(path: Path) -> AutopilotLog:
     if kind is None:
         raise NotAutopilotLogError(f"{path}: no {', '.join(FORMATS.values())}")
     if kind == "ulog":
-        return read_ulog(path)
+        return [read_ulog(path)]
     try:
         if kind == "tlog":
             from host.readers.tlog_messages import read_tlog

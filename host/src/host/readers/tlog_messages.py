@@ -1,21 +1,25 @@
 """MAVLink telemetry logs in portions: pymavlink says how messages are laid out, numpy reads them.
 
-A message's own time since boot counts where it has one; the radio's delay is then not in it.
+A message's own time since boot counts where it has one; the radio's delay is then not in it. Others
+are timed by the ground station, whose clock messages with both connect to the autopilot's. A sender
+is a component of a system: what another component of the vehicle says is not the autopilot's.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from host.arrays import Array, BoolArray
+from host.arrays import Array, BoolArray, IntArray
 from host.progress import progress_bar
 from host.readers.autopilot_log import AutopilotLog, Messages, NotAutopilotLogError
+from host.readers.clock_epochs import clock_sets, epoch_starts
 from host.readers.mavlink_frames import Frames, frames_of
 from host.readers.mavlink_layout import Layout, layouts
 from host.readers.plausible_times import plausible_times
@@ -27,32 +31,33 @@ WRAP_US = float(1 << 32)
 OTHER_CLOCK_S = 1e9  # a time since boot is shorter than thirty years
 PORTION_BYTES = 8 << 20  # read at a time
 STAMP = "received_s"  # of the ground station, beside a message's own fields
+PLACE = "place"  # of a message's frame in the log
 BOTH_CLOCKS = "ATTITUDE"  # has both clocks, so it dates the autopilot's start
 Fields = dict[str, NDArray[Any]]
 
 
 @dataclass(slots=True)
 class _Received:
-    """Received messages by kind and system, in parts, with the losses of each sender."""
+    """Received messages by kind and sender, in parts, with the losses of each sender."""
 
     parts: dict[tuple[int, str], list[Fields]] = field(default_factory=dict)
-    started_s: dict[int, list[Array]] = field(default_factory=dict)
+    frames: int = 0
     last_number: dict[int, int] = field(default_factory=dict)
     lost: dict[int, int] = field(default_factory=dict)
     many: dict[int, int] = field(default_factory=dict)
     wrong_crc: int = 0
     strange_bytes: int = 0
 
-    def systems(self) -> dict[int, int]:
-        """Return how many wanted messages each system sent."""
+    def senders(self) -> dict[int, int]:
+        """Return how many wanted messages each sender sent."""
         found: dict[int, int] = {}
-        for (system, _), parts in self.parts.items():
-            found[system] = found.get(system, 0) + sum(len(next(iter(p.values()))) for p in parts)
+        for (sender, _), parts in self.parts.items():
+            found[sender] = found.get(sender, 0) + sum(len(part[PLACE]) for part in parts)
         return found
 
-    def take(self, system: int, name: str) -> Fields | None:
+    def take(self, sender: int, name: str) -> Fields | None:
         """Return all messages of a kind and free their memory: a log may have a gigabyte."""
-        parts = self.parts.pop((system, name), None)
+        parts = self.parts.pop((sender, name), None)
         if parts is None:
             return None
         found = {}
@@ -67,8 +72,8 @@ class _Received:
         return found
 
 
-def read_tlog(path: Path) -> AutopilotLog:
-    """Read a telemetry log.
+def read_tlog(path: Path) -> list[AutopilotLog]:
+    """Read a telemetry log: what each start of the autopilot sent.
 
     Raises
     ------
@@ -78,36 +83,85 @@ def read_tlog(path: Path) -> AutopilotLog:
         If pymavlink is missing.
     """
     received = _received(path)
-    many = received.systems()
-    vehicles = {system: _heartbeat(received, system) for system in many}
-    known = {system: beat for system, beat in vehicles.items() if beat is not None}
+    many = received.senders()
+    vehicles = {sender: _heartbeat(received, sender) for sender in many}
+    known = {sender: beat for sender, beat in vehicles.items() if beat is not None}
     if not known:
         raise NotAutopilotLogError(
             f"{path}: no frame of a vehicle (HEARTBEAT) in it; expected a MAVLink telemetry log"
         )
-    system = max(known, key=lambda s: many[s])
-    damage = _damage(received, system)
-    if len(known) > 1:
-        damage.append(f"{len(known)} vehicles speak in it; system {system} is read")
-    kind, autopilot = known[system]
-    texts = _words((received.take(system, "STATUSTEXT") or {}).get("text", ()))
-    values = received.take(system, "PARAM_VALUE") or {}
-    parameters = dict(
-        zip(_words(values.get("param_id", ())), map(float, values.get("param_value", ())),
-            strict=True)
-    )  # fmt: skip
-    return AutopilotLog(
-        path=path,
-        format="tlog",
-        autopilot=AUTOPILOTS.get(autopilot, "ardupilot"),
-        vehicle=BY_MAV_TYPE.get(kind, ""),
-        firmware=next((t for t in texts if "ardu" in t.lower() or "px4" in t.lower()), ""),
-        messages=_messages(received, system, damage),
-        parameters=parameters,
-        damage=tuple(damage),
-        lost=received.wrong_crc + (1 if received.strange_bytes else 0),
-        texts=tuple(texts),
+    sender = max(known, key=lambda s: many[s])
+    damage = _damage(received, sender)
+    systems = {one >> 8 for one in known}
+    if len(systems) > 1:
+        damage.append(f"{len(systems)} vehicles speak in it; system {sender >> 8} is read")
+    remarks = _other_components(received, sender)
+    tables = {
+        name: received.take(sender, name) or {}
+        for name in [name for one, name in received.parts if one == sender]
+    }
+    received.parts.clear()
+    starts = epoch_starts(
+        (fields[PLACE], own_s)
+        for name, fields in tables.items()
+        if (own_s := _own_times(name, fields)) is not None
     )
+    kind, autopilot = known[sender]
+    lost = received.wrong_crc + (1 if received.strange_bytes else 0)
+    logs = []
+    for first, end in pairwise([0, *starts, received.frames]):
+        own = {name: _between(fields, first, end) for name, fields in tables.items()}
+        if len(starts) == 0:
+            tables.clear()
+        own_damage, own_remarks = list(damage), list(remarks)
+        texts = _words(own.pop("STATUSTEXT", {}).get("text", ()))
+        values = own.pop("PARAM_VALUE", {})
+        words = _words(values.get("param_id", ()))
+        logs.append(
+            AutopilotLog(
+                path=path,
+                format="tlog",
+                autopilot=AUTOPILOTS.get(autopilot, "ardupilot"),
+                vehicle=BY_MAV_TYPE.get(kind, ""),
+                firmware=next((t for t in texts if "ardu" in t.lower() or "px4" in t.lower()), ""),
+                messages=_messages(own, own_damage, own_remarks),
+                parameters=dict(zip(words, map(float, values.get("param_value", ())), strict=True)),
+                damage=tuple(own_damage),
+                lost=lost,
+                texts=tuple(texts),
+                remarks=tuple(own_remarks),
+            )
+        )
+    # The station asks for parameters once, whatever restarts behind its back.
+    said: dict[str, float] = {}
+    for log in reversed(logs):
+        said |= log.parameters
+    for k, log in enumerate(logs):
+        said = {**said, **log.parameters}
+        logs[k] = replace(log, parameters=said)
+    return logs
+
+
+def _between(fields: Fields, first: int, end: int) -> Fields:
+    """Return the messages from one place of the log to another; views where these are all."""
+    if PLACE not in fields:
+        return fields
+    low, high = np.searchsorted(fields[PLACE], [first, end])
+    return {key: values[low:high] for key, values in fields.items()}
+
+
+def _other_components(received: _Received, sender: int) -> list[str]:
+    """Return a line on messages that another component of the vehicle sends too."""
+    own = {name for one, name in received.parts if one == sender} - {"HEARTBEAT"}
+    found = []
+    for one in sorted({one for one, _ in received.parts if one >> 8 == sender >> 8} - {sender}):
+        both = sorted(name for other, name in received.parts if other == one and name in own)
+        if both:
+            found.append(
+                f"component {one & 255} of the vehicle sends {', '.join(both)} too: left out, that"
+                f" of component {sender & 255} is used"
+            )
+    return found
 
 
 def _received(path: Path) -> _Received:
@@ -142,17 +196,14 @@ def _add(found: _Received, data: bytes, frames: Frames, known: Mapping[int, Layo
         found.many[sender] = found.many.get(sender, 0) + len(numbers)
         found.last_number[sender] = int(numbers[-1])
     view = np.frombuffer(data, dtype=np.uint8)
-    systems = frames.senders >> 8
     for number, layout in known.items():
         of_kind = frames.kinds == number
-        for system in np.unique(systems[of_kind]).tolist():
-            rows = np.flatnonzero(of_kind & (systems == system))
+        for sender in np.unique(frames.senders[of_kind]).tolist():
+            rows = np.flatnonzero(of_kind & (frames.senders == sender))
             part = _fields(view, frames, rows, layout)
-            if layout.name == BOTH_CLOCKS:
-                started = part.pop(STAMP) - part["time_boot_ms"] * 1e-3
-                begins = found.started_s.setdefault(system, [started[:1]])
-                begins.append((started - begins[0]).astype(np.float32))  # jitter of the radio
-            found.parts.setdefault((system, layout.name), []).append(part)
+            part[PLACE] = (rows + found.frames).astype(np.uint32)
+            found.parts.setdefault((sender, layout.name), []).append(part)
+    found.frames += len(frames.starts)
 
 
 def _fields(
@@ -176,9 +227,9 @@ def _fields(
     return part
 
 
-def _heartbeat(received: _Received, system: int) -> tuple[int, int] | None:
-    """Return kind of vehicle and of autopilot from a system's heartbeat; None for other systems."""
-    parts = received.parts.get((system, "HEARTBEAT"), [])
+def _heartbeat(received: _Received, sender: int) -> tuple[int, int] | None:
+    """Return kind of vehicle and of autopilot from a sender's heartbeat; None for other senders."""
+    parts = received.parts.get((sender, "HEARTBEAT"), [])
     beats = [
         (int(kind), int(autopilot))
         for part in parts
@@ -188,15 +239,13 @@ def _heartbeat(received: _Received, system: int) -> tuple[int, int] | None:
     return beats[len(beats) // 2] if beats else None
 
 
-def _damage(received: _Received, system: int) -> list[str]:
+def _damage(received: _Received, sender: int) -> list[str]:
     said = []
     if received.wrong_crc:
         said.append(f"{received.wrong_crc} frames have a wrong checksum and were left out")
     if received.strange_bytes:
         said.append(f"{received.strange_bytes} bytes belong to no frame")
-    senders = [sender for sender in received.many if sender >> 8 == system]
-    lost = sum(received.lost[sender] for sender in senders)
-    total = sum(received.many[sender] for sender in senders)
+    lost, total = received.lost[sender], received.many[sender]
     if lost:
         share = 100.0 * lost / (lost + total)
         said.append(f"{lost} frames ({share:.1f} %) of the vehicle never came: the radio lost them")
@@ -208,13 +257,13 @@ def _words(raw: Any) -> list[str]:
 
 
 def _messages(
-    received: _Received, system: int, damage: list[str]
+    tables: dict[str, Fields], damage: list[str], remarks: list[str]
 ) -> dict[str, dict[int, Messages]]:
-    boot_s = _boot_s(received, system)
+    station = _Station(tables, remarks)
     found: dict[str, dict[int, Messages]] = {}
-    for name in [name for one, name in received.parts if one == system]:
-        fields = received.take(system, name) or {}
-        t_s = _times(name, fields, boot_s)
+    for name in list(tables):
+        fields = dict(tables.pop(name))
+        t_s = _times(name, fields, station)
         ports = fields.pop("port", None)
         for port in (0,) if ports is None else np.unique(ports).tolist():
             mine = slice(None) if ports is None or len(np.unique(ports)) == 1 else ports == port
@@ -242,23 +291,51 @@ def _increasing_rows(t_s: Array, kept: BoolArray) -> Any:
     return rows[np.concatenate([[True], np.diff(t_s[rows]) > 0.0])]
 
 
-def _boot_s(received: _Received, system: int) -> float:
-    """Return the ground station's time at which the autopilot started."""
-    if started := received.started_s.pop(system, None):
-        return float(started[0][0] + np.median(np.concatenate(started[1:])))
-    every = [part[STAMP] for (one, _), some in received.parts.items() if one == system
-             for part in some if STAMP in part]  # fmt: skip
-    return float(min(stamps.min() for stamps in every)) if every else 0.0
+class _Station:
+    """The clock of the ground station, and the instants of it at which the autopilot's was 0.
+
+    There are several where the station's clock was set: from each place in the log on another.
+    """
+
+    def __init__(self, tables: Mapping[str, Fields], remarks: list[str]) -> None:
+        both = tables.get(BOTH_CLOCKS, {})
+        self._places: IntArray = np.zeros(0, dtype=np.int64)
+        if not len(both.get(STAMP, ())):
+            every = [fields[STAMP] for fields in tables.values() if len(fields.get(STAMP, ()))]
+            self._boots_s = np.array([min((float(s.min()) for s in every), default=0.0)])
+            return
+        started = both[STAMP] - both["time_boot_ms"] * 1e-3
+        sets = clock_sets(started)
+        self._boots_s = np.array([np.median(part) for part in np.split(started, sets)])
+        self._places = both[PLACE][sets].astype(np.int64)
+        for row, change_s in zip(sets.tolist(), np.diff(self._boots_s).tolist(), strict=True):
+            remarks.append(
+                f"the ground station's clock was set by {change_s:+.1f} s at"
+                f" {both['time_boot_ms'][row] * 1e-3:.1f} s: taken out of the messages that it"
+                " timed"
+            )
+
+    def since_boot_s(self, stamps: Array, places: IntArray) -> Array:
+        """Return times since boot of messages by their time of reception."""
+        return np.asarray(stamps - self._boots_s[np.searchsorted(self._places, places, "right")])
 
 
-def _times(name: str, fields: Fields, boot_s: float) -> Array:
-    """Return times since boot: a message's own where it has one."""
+def _own_times(name: str, fields: Fields) -> Array | None:
+    """Return times since boot of messages that say it themselves."""
     if "time_boot_ms" in fields:
-        return np.asarray(fields.pop("time_boot_ms") * 1e-3, dtype=np.float64)
-    raw_us, stamps = fields.pop("time_usec", None), fields.pop(STAMP, None)
-    if stamps is not None:
-        return np.asarray(stamps - boot_s)
-    own_us = np.asarray(raw_us, dtype=np.float64)
+        return np.asarray(fields["time_boot_ms"] * 1e-3, dtype=np.float64)
+    if STAMP in fields or "time_usec" not in fields:
+        return None
+    own_us = np.asarray(fields["time_usec"], dtype=np.float64)
     if name == "SERVO_OUTPUT_RAW":  # 32 bits
         own_us = np.unwrap(own_us, period=WRAP_US)
     return own_us * 1e-6
+
+
+def _times(name: str, fields: Fields, station: _Station) -> Array:
+    """Return times since boot: a message's own where it has one."""
+    own_s = _own_times(name, fields)
+    places, stamps = fields.pop(PLACE), fields.pop(STAMP, None)
+    for stamp in ("time_boot_ms", "time_usec"):
+        fields.pop(stamp, None)
+    return own_s if own_s is not None else station.since_boot_s(stamps, places)

@@ -59,6 +59,11 @@ class Topic:
         """Return one column of all messages."""
         return np.frombuffer(self.data, self.packed)[name].copy()
 
+    def first(self, name: str, most: int = 5) -> NDArray[Any]:
+        """Return a column of the first messages."""
+        count = min(most, len(self.data) // self.packed.itemsize)
+        return np.frombuffer(self.data, self.packed, count)[name].copy()
+
 
 @dataclass(slots=True)
 class ULogContent:

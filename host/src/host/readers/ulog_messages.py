@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from host.arrays import Array
 from host.readers.autopilot_log import AutopilotLog, Messages, NotAutopilotLogError
+from host.readers.clock_epochs import clock_origin_s
 from host.readers.plausible_times import plausible_times
 from host.readers.ulog_binary import SAID, Topic, ULogContent, UnknownFlagsError, read_content
 
@@ -96,24 +98,35 @@ def _messages(log: ULogContent, damage: list[str]) -> dict[str, dict[int, Messag
     """
     found: dict[str, dict[int, Messages]] = {}
     log.topics.sort(key=lambda topic: len(topic.data), reverse=True)
+    origin_s = clock_origin_s(topic.first("timestamp") * 1e-6 for topic in log.topics
+                              if _is_timed(topic))  # fmt: skip
     while log.topics:
         topic = log.topics.pop()
-        messages = _topic(topic, damage)
+        messages = _topic(topic, origin_s, damage)
         if messages is not None:
             found.setdefault(topic.name, {})[topic.instance] = messages
     return dict(sorted(found.items()))
 
 
-def _topic(topic: Topic, damage: list[str]) -> Messages | None:
-    """Return the messages of one topic, column by column."""
-    name, columns = topic.name, topic.columns
-    if "timestamp" not in columns or not topic.data:
-        return None
+def _is_timed(topic: Topic) -> bool:
+    return "timestamp" in topic.columns and bool(topic.data)
+
+
+def _times(topic: Topic) -> Array:
+    """Return when each message was sampled, s, by the clock of the log."""
     use = topic.column("timestamp")
-    if "timestamp_sample" in columns:
+    if "timestamp_sample" in topic.columns:
         sampled = topic.column("timestamp_sample")
         use = sampled if (sampled > 0).mean() > 0.9 else use
-    t_s = np.asarray(use, dtype=np.float64) * 1e-6
+    return np.asarray(use, dtype=np.float64) * 1e-6
+
+
+def _topic(topic: Topic, origin_s: float, damage: list[str]) -> Messages | None:
+    """Return the messages of one topic, column by column."""
+    name, columns = topic.name, topic.columns
+    if not _is_timed(topic):
+        return None
+    t_s = _times(topic) - origin_s
     kept, wrong = plausible_times(t_s)
     if wrong:
         damage.append(f"{wrong} messages of {name} have an impossible time, left out")

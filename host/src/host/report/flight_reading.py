@@ -25,6 +25,7 @@ from host.progress import progress_bar
 from host.readers.autopilot_flight import is_autopilot_log, read_autopilot
 from host.readers.autopilot_summary import autopilot_meta, summarise_autopilot, summary_lines
 from host.readers.even_grid import FITTED, even_arrays
+from host.readers.flight_choice import with_flight
 from host.report.gps_position import (
     calibration_values,
     changed_position,
@@ -71,11 +72,11 @@ def read_flight(wanted: FlightRequest) -> tuple[ShownFlight, Path]:
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
     if looks_like_rows(head):
-        _refuse(wanted, path, "original ASCII rows", ("session", "file-id", "sensor"))
+        _refuse(wanted, path, "original ASCII rows", ("flight", "file-id", "sensor"))
         return _of_rows(wanted, path), path
     if is_autopilot_log(path):
         _refuse(wanted, path, "a log of an autopilot",
-                ("session", "file-id", "row-rate", "calibration"))  # fmt: skip
+                ("file-id", "row-rate", "calibration"))  # fmt: skip
         return _of_autopilot(wanted, path), path
     _refuse(wanted, path, "a log of ours", ("row-rate", "sensor"))
     return _of_log(wanted, path), path
@@ -83,7 +84,7 @@ def read_flight(wanted: FlightRequest) -> tuple[ShownFlight, Path]:
 
 def _refuse(wanted: FlightRequest, path: Path, kind: str, options: tuple[str, ...]) -> None:
     given = {
-        "session": wanted.session, "file-id": wanted.file_id, "row-rate": wanted.row_rate_hz,
+        "flight": wanted.session, "file-id": wanted.file_id, "row-rate": wanted.row_rate_hz,
         "calibration": wanted.calibration, "sensor": wanted.sensors or None,
     }  # fmt: skip
     for option in options:
@@ -165,7 +166,7 @@ def _of_rows(wanted: FlightRequest, path: Path) -> ShownFlight:
 
 
 def _of_autopilot(wanted: FlightRequest, path: Path) -> ShownFlight:
-    flight = read_autopilot(path, dict(wanted.sensors))
+    flight = read_autopilot(path, dict(wanted.sensors), wanted.session)
     summary = finite(summarise_autopilot(flight))
     columns = flight.columns()
     if not columns:
@@ -218,9 +219,13 @@ def _found_in(path: Path, wanted: FlightRequest) -> tuple[Maneuvers, list[str]]:
     """Return the test points of a source whose sensors are slow, and drop out: what stands still
     counts as missing there, as in `host maneuvers`."""
     try:
-        found, _ = read_columns(path, calibration=wanted.calibration,
-                                sensors=dict(wanted.sensors),
-                                row_rate_hz=wanted.row_rate_hz)  # fmt: skip
+        (source,) = with_flight([path], wanted.session)
+        found, _ = read_columns(
+            source,
+            calibration=wanted.calibration,
+            sensors=dict(wanted.sensors),
+            row_rate_hz=wanted.row_rate_hz,
+        )
         return [(item, grade(found, item)) for item in detect_maneuvers(found)], []
     except HostError as error:
         return [], [_no_maneuvers(str(error), path)]

@@ -13,6 +13,7 @@ from host.files.user_text import read_text
 from host.original.rows import looks_like_rows
 from host.preflight.preflight_sheet import sheet_beside, sheet_lines
 from host.readers.autopilot_flight import is_autopilot_log
+from host.readers.flight_choice import file_and_flight
 from host.readers.foreign_tables import TEXT_KINDS
 from host.report.flight_reading import FlightRequest, read_flight
 from host.report.plotting import page_file, write_text
@@ -61,9 +62,10 @@ def write_report(request: ReportRequest) -> tuple[Path, Identification]:
     HostError
         As `host.identify`; UsageError if the place cannot be written to.
     """
-    first = request.sources[0]
+    files = list(dict.fromkeys(file_and_flight(one)[0] for one in request.sources))
+    first = files[0]
     target = page_file(request.output, first if first.suffix else first / "flight", ".report.html")
-    if any(target.exists() and target.samefile(one) for one in request.sources):
+    if any(target.exists() and target.samefile(one) for one in files):
         raise UsageError(f"{target} is the source itself; name another file with -o")
     sheet = _sheet(request.preflight or sheet_beside(first))
     options = dict(request.options)
@@ -85,7 +87,7 @@ def write_report(request: ReportRequest) -> tuple[Path, Identification]:
         flights=flights,
         aircraft=str(request.options.get("aircraft") or ""),
         versions=versions(),
-        hashes=hashes([*request.sources, *sorted(calibrations), *others]),
+        hashes=hashes([*files, *sorted(calibrations), *others]),
         command=request.command,
         sheet=sheet,
         calibrations=hashes(sorted(calibrations)),
@@ -114,7 +116,7 @@ def _flight(
     source: Path, calibration: Path | None, options: Mapping[str, Any]
 ) -> ShownFlight | None:
     """Return a log as a flight to show; None for a table, which has no events and losses."""
-    if source.suffix.lower() in _TABLES:
+    if file_and_flight(source)[0].suffix.lower() in _TABLES:
         return None
     try:
         return read_flight(_flight_request(source, calibration, options))[0]
@@ -127,14 +129,16 @@ def _flight(
 def _flight_request(
     source: Path, calibration: Path | None, options: Mapping[str, Any]
 ) -> FlightRequest:
+    source, flight = file_and_flight(source)
     if is_autopilot_log(source):
-        return FlightRequest(source, sensors=tuple(options.get("sensors", {}).items()))
+        chosen = tuple(options.get("sensors", {}).items())
+        return FlightRequest(source, session=flight, sensors=chosen)
     rows = False
     if source.is_file():
         with source.open("rb") as file:
             rows = looks_like_rows(file.read(_HEAD_BYTES))
     rate_hz = options.get("row_rate_hz") if rows else None
-    return FlightRequest(source, calibration=calibration, row_rate_hz=rate_hz)
+    return FlightRequest(source, session=flight, calibration=calibration, row_rate_hz=rate_hz)
 
 
 def _sheet(path: Path | None) -> tuple[str, list[str]] | None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from host.decode.newest_flight import source_or_newest
 from host.placed_arguments import StorePlaced, of_each, stretches_of_each
-from host.source_arguments import add_data_choices
+from host.source_arguments import add_data_choices, add_flight
 
 if TYPE_CHECKING:
     from host.sysid.answer import OutputPaths
@@ -76,6 +76,7 @@ def _add_data(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--to", dest="ends", action=StorePlaced, const=1, type=float, metavar="S",
                         default=[], help="end of it")  # fmt: skip
     add_data_choices(parser)
+    add_flight(parser, every=True)
     parser.add_argument("--no-delays", action="store_true",
                         help="estimate no delay of a sensor")  # fmt: skip
 
@@ -120,6 +121,7 @@ def _run(args: argparse.Namespace) -> int:
     from host.aircraft.origin import announce_aircraft
     from host.errors import ExitCode
     from host.readers.autopilot_flight import chosen_sensors
+    from host.readers.flight_choice import with_flight
     from host.sysid.answer import check_outputs
     from host.sysid.estimators import read_options
     from host.sysid.pipeline import identify
@@ -130,6 +132,7 @@ def _run(args: argparse.Namespace) -> int:
         print("\n".join(lines))
         return int(ExitCode.OK)
     args.source = args.source or [source_or_newest(None)]
+    args.source = with_flight(args.source, args.flight)
     places = _places(args)
     check_outputs(places, requested_methods(args.method))
     found = identify(

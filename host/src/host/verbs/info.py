@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from host.decode.newest_flight import source_or_newest
-from host.source_arguments import add_sensor
+from host.source_arguments import add_flight, add_sensor
 
 
 def add_parser(subparsers: Any) -> None:
@@ -28,6 +28,7 @@ def add_parser(subparsers: Any) -> None:
         " working folder without it",
     )
     add_sensor(parser)
+    add_flight(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
@@ -48,7 +49,10 @@ def run(args: argparse.Namespace) -> int:
         )
         return int(ExitCode.OK)
     if is_autopilot_log(source):
-        summary = summarise_autopilot(read_autopilot(source, chosen_sensors(args.sensor)))
+        flight = read_autopilot(source, chosen_sensors(args.sensor), args.flight)
+        summary = summarise_autopilot(flight)
+        for one in summary["flights"]:
+            one["maneuvers"] = _maneuvers(source, one["number"])
         print(
             json.dumps(summary, indent=2)
             if args.json
@@ -58,6 +62,20 @@ def run(args: argparse.Namespace) -> int:
     head = describe(source)
     print(json.dumps(head, indent=2) if args.json else "\n".join(map(shown, head_lines(head))))
     return int(ExitCode.OK)
+
+
+def _maneuvers(source: Path, number: int) -> int | None:
+    """Return how many test points a flight of a log has; None if nothing can be said of it."""
+    from host.errors import HostError
+    from host.readers.flight_choice import with_flight
+    from host.sysid.flight.flight_tables import read_columns
+    from host.sysid.maneuvers.maneuver_detection import detect_maneuvers
+
+    try:
+        columns, _ = read_columns(*with_flight([source], number))
+    except HostError:
+        return None
+    return len(detect_maneuvers(columns))
 
 
 def _table(flights: list[dict[str, Any]]) -> list[str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from host.decode.newest_flight import source_or_newest
-from host.source_arguments import add_row_rate, add_sensor
+from host.source_arguments import add_flight, add_row_rate, add_sensor
 
 
 def add_parser(subparsers: Any) -> None:
@@ -28,6 +28,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--calibration", type=Path, metavar="TOML", help="calibration of a log")
     add_row_rate(parser)
     add_sensor(parser)
+    add_flight(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
@@ -37,6 +38,7 @@ def run(args: argparse.Namespace) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.errors import ExitCode, IdentificationError
     from host.readers.autopilot_flight import chosen_sensors
+    from host.readers.flight_choice import with_flight
     from host.readers.shipped_maps import LIST, map_lines
     from host.sysid.answer import json_text
     from host.sysid.answer.json_document import maneuver_document
@@ -49,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
         print("\n".join(map_lines()))
         return int(ExitCode.OK)
     try:
-        source = source_or_newest(args.source)
+        (source,) = with_flight([source_or_newest(args.source)], args.flight)
         columns, notes = read_columns(source, args.map, calibration=args.calibration,
                                       sensors=chosen_sensors(args.sensor),
                                       row_rate_hz=args.row_rate)  # fmt: skip

@@ -10,7 +10,7 @@ from typing import Any
 
 from host.decode.newest_flight import source_or_newest
 from host.placed_arguments import StorePlaced, of_each, stretches_of_each
-from host.source_arguments import add_data_choices
+from host.source_arguments import add_data_choices, add_flight
 
 
 def add_parser(subparsers: Any) -> None:
@@ -37,6 +37,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--to", dest="ends", type=float, metavar="S", action=StorePlaced,
                         const=1, default=[], help="end of it")  # fmt: skip
     add_data_choices(parser)
+    add_flight(parser, every=True)
     parser.add_argument("--no-constants", action="store_true",
                         help="fit nothing: start from the trim before each input")  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -50,6 +51,7 @@ def run(args: argparse.Namespace) -> int:
     from host.aircraft.origin import announce_aircraft
     from host.errors import ExitCode, IdentificationError, UsageError
     from host.readers.autopilot_flight import chosen_sensors
+    from host.readers.flight_choice import with_flight
     from host.readers.shipped_maps import LIST, map_lines
     from host.sysid.answer import OutputPaths, check_outputs
     from host.sysid.checks.data_finding import check_lines
@@ -70,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
         if not args.source:
             raise IdentificationError("name a saved model, and behind it the records it predicts")
         model, *records = args.source
-        records = records or [source_or_newest(None)]
+        records = with_flight(records or [source_or_newest(None)], args.flight)
         check_outputs(OutputPaths(plots=args.plots))
         found = predict(
             model,

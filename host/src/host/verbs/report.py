@@ -10,7 +10,7 @@ from typing import Any
 
 from host.decode.newest_flight import source_or_newest
 from host.placed_arguments import StorePlaced, of_each
-from host.source_arguments import add_row_rate, add_sensor
+from host.source_arguments import add_flight, add_row_rate, add_sensor
 
 _DESCRIPTION = """\
 Identify the aircraft from one or several flights, as `host identify` does, and write the
@@ -97,6 +97,7 @@ def _add_answer_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_row_rate(parser)
     add_sensor(parser)
+    add_flight(parser, every=True)
     parser.add_argument("--no-delays", action="store_true", help="estimate no delay of a sensor")
     parser.add_argument("--open", action="store_true", help="open the page in the browser")
     parser.add_argument("--json", action="store_true", help="print the numbers as JSON too")
@@ -109,12 +110,13 @@ def run(args: argparse.Namespace) -> int:
     from host.aircraft.origin import announce_aircraft
     from host.errors import ExitCode, UsageError
     from host.readers.autopilot_flight import chosen_sensors
+    from host.readers.flight_choice import with_flight
     from host.report.reporting import ReportRequest, write_report
     from host.sysid.pipeline.arguments import option_words
     from host.terminal import command_line
     from host.text import shown
 
-    sources = args.source or [source_or_newest(None)]
+    sources = with_flight(args.source or [source_or_newest(None)], args.flight)
     calibration = of_each("--calibration", args.calibration, len(sources))
     given = [args.prior, *(path for _, path in (*args.map, *args.truth))]
     files = [path for path in given if path is not None]

@@ -42,6 +42,7 @@ CHECKS = {
     "airspeed-against-ax": "airspeed against forward force and weight",
     "altitude-against-climb": "altitude against vertical speed",
     "stuck-sensor": "a sensor moves where kinematics says that it must",
+    "time-digits": "the time has a digit for every row",
     "surface-rate": "outputs are logged as often as servos take them",
     "instrument-errors": "errors of sensors and servos are in the intervals",
     "flow-angles": "vanes measured angle of attack and sideslip",

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from host.readers.column_map import Line, listed, mapped, missing_lines, read_ma
 from host.readers.column_sampling import Sampling
 from host.readers.derived_columns import derived_columns
 from host.readers.even_grid import FITTED, LONGEST_GAP_S, USED, even_grid, rows_in_order
+from host.readers.flight_choice import file_and_flight
 from host.readers.foreign_tables import (
     TEXT_KINDS,
     Foreign,
@@ -35,6 +36,7 @@ from host.readers.foreign_tables import (
 )
 from host.readers.original_table import is_original, original_table
 from host.readers.recorded import commanded_by_map, recording_of_log, recording_of_table
+from host.readers.table_clock import counted_on, evenly_timed, one_recording
 from host.sysid.checks.data_finding import Finding
 from host.sysid.checks.finding_consequences import checked
 from host.sysid.checks.measured import Measured, measured
@@ -148,6 +150,9 @@ def read_flight_columns(
         columns |= input_columns(columns["t_s"], found.inputs)
         columns |= derived_columns(columns, wanted)
         return FlightColumns(columns, notes, found.recording, found.calibration)
+    timing: list[Finding] = []
+    if not found.shares:  # a table: an autopilot's log is read clock by clock
+        used = _timed(used, source, notes, timing)
     seen = _measured(used, notes, accept)
     even = even_grid(seen.columns, notes)
     columns, findings = checked(even, accept)
@@ -157,7 +162,7 @@ def read_flight_columns(
         notes,
         found.recording,
         found.calibration,
-        [*_slow_outputs(found.slow_outputs), *seen.findings, *findings],
+        [*timing, *_slow_outputs(found.slow_outputs), *seen.findings, *findings],
         _resolutions(seen.sampling, even, columns),
         tuple(s for s in found.shares if f"{s}_rad" not in lines),
     )
@@ -196,6 +201,31 @@ def _refuse_unusable(
     if both:
         raise IdentificationError(f"{called}: several columns '{both[0]}': rename them")
     same_length(used, called)
+
+
+def _timed(
+    columns: dict[str, Array], source: Any, notes: list[str], findings: list[Finding]
+) -> dict[str, Array]:
+    """Return the rows of one recording with times that go on, and a finding where they were made
+    even."""
+    flight = file_and_flight(source)[1] if isinstance(source, Path) else None
+    columns = columns | {"t_s": counted_on(columns["t_s"], notes)}
+    columns = one_recording(columns, flight, source_name(source), notes)
+    even = evenly_timed(columns)
+    if even is None:
+        return columns
+    t_s, digit_s = even
+    rate_hz = 1.0 / float(t_s[1] - t_s[0])
+    findings.append(
+        Finding(
+            "time-digits",
+            (),
+            f"t_s has digits of {digit_s:.3g} s where rows come at {rate_hz:.4g} Hz",
+            ("a time that was written with too few digits",),
+            done="rows are timed evenly, which agrees with every digit",
+        )
+    )
+    return columns | {"t_s": t_s}
 
 
 def _measured(columns: dict[str, Array], notes: list[str], accept: Collection[str]) -> Measured:
@@ -264,14 +294,15 @@ def _read(
             found.calibration = default if source.attrs["calibration"] == default.name else None
             return found, True
     else:
+        source, flight = file_and_flight(source)
         file_or_folder(source, IdentificationError)
         if is_autopilot_log(source):
-            return autopilot_table(source, sensors), False
+            return autopilot_table(source, sensors, flight), False
         if is_original(source):
             return original_table(source, calibration, row_rate_hz), False
         kind = source.suffix.lower()
         if kind not in READ or (kind in TEXT_KINDS[1:] and mapping is None):  # original rows
-            log = _recorded(source, calibration, wanted, maybe_table=kind != ".bin")
+            log = _recorded(source, calibration, wanted, flight, maybe_table=kind != ".bin")
             if log is not None:
                 return log, True
         found = read_foreign(source)
@@ -289,7 +320,12 @@ def _with_its_index(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _recorded(
-    source: Path, calibration: Path | None, wanted: Collection[str], *, maybe_table: bool
+    source: Path,
+    calibration: Path | None,
+    wanted: Collection[str],
+    session: int | None,
+    *,
+    maybe_table: bool,
 ) -> Foreign | None:
     """Return the columns of a log; None if it is none but may be a table of text."""
     from host.errors import NotALogError
@@ -297,14 +333,16 @@ def _recorded(
     if source.is_file():
         refuse_other(source)
     try:
-        return _log(source, calibration, wanted)
+        return _log(source, calibration, wanted, session)
     except NotALogError:
         if maybe_table and source.is_file() and is_text(source):
             return None
         raise
 
 
-def _log(source: Path, calibration: Path | None, wanted: Collection[str]) -> Foreign:
+def _log(
+    source: Path, calibration: Path | None, wanted: Collection[str], session: int | None
+) -> Foreign:
     from host.log import read_log
     from host.log.source import find_flights, newest
 
@@ -314,7 +352,7 @@ def _log(source: Path, calibration: Path | None, wanted: Collection[str]) -> For
         source = newest(source, flights).path
         if len(flights) > 1:
             notes.append(f"{source.name} is the newest of {len(flights)} logs in the folder")
-    log = read_log(source, calibration=calibration)
+    log = read_log(source, session=session, calibration=calibration)
     raw, found = _columns_of(log, wanted)
     lost = 0 if log.complete == "complete" else 1  # what is lost is said first
     notes = [*found[:lost], *notes, *found[lost:]]
