@@ -244,7 +244,6 @@ FAULTS: dict[str, tuple[Callable[[pd.DataFrame], pd.DataFrame], str]] = {
     "few": (lambda t: t.iloc[:20], "20 samples with a time"),
     "no such column": (lambda t: t.rename(columns={"AOA": "aoa"}), "did you mean aoa"),
     "text": (lambda t: t.assign(Q="fast"), "'Q' is text"),
-    "two recordings": (lambda t: pd.concat([t, t]), "row 3001: more than one recording"),
     "still": (lambda t: t.assign(TimeUS=5.0), "time stands still"),
     "milliseconds": (lambda t: t.assign(TimeUS=t["TimeUS"] / 1e3), "is the unit of t_s right"),
     "clock set": (lambda t: t.assign(TimeUS=t["TimeUS"] + 1e15 * (t.index > 9)), "time jumps from"),

@@ -19,6 +19,8 @@ HEAD_LINES = 60
 DELIMITERS = ",;\t|"
 SPACES = " "  # any run of blanks
 COMMENT = "#"
+MOST_SHORT = 0.05  # of the rows: more are no accident
+_BEGINS_NUMBER = frozenset("0123456789+-.")
 DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(e[+-]?\d+)?", re.IGNORECASE)
 DECIMAL_POINT = re.compile(r"[+-]?\d*\.\d+(e[+-]?\d+)?", re.IGNORECASE)
 
@@ -62,13 +64,14 @@ def read_text(source: Path, head: bytes) -> Text:
         hint = "column names and no row below them" if dialect.names else "no line of numbers"
         raise IdentificationError(f"{source}: not a CSV table: {hint}")
     names, twice = _labels(dialect)
-    notes = []
+    notes: list[str] = []
     if not dialect.names:
         notes.append(f"no line of column names: columns are called 1 to {dialect.width}")
     elif dialect.first > 1:
         notes.append(f"the first {dialect.first - 1} lines hold no names and were left out")
     for attempt in (encoding, "cp1252", "latin-1"):
         try:
+            strange = _strange_lines(source, attempt, dialect, notes)
             frame = pd.read_csv(
                 source,
                 sep=r"\s+" if dialect.delimiter == SPACES else dialect.delimiter,
@@ -76,7 +79,7 @@ def read_text(source: Path, head: bytes) -> Text:
                 encoding=attempt,
                 header=None,
                 names=names,
-                skiprows=dialect.first,
+                skiprows=[*range(dialect.first), *strange],
                 comment=COMMENT,
                 skipinitialspace=True,
                 index_col=False,
@@ -90,6 +93,59 @@ def read_text(source: Path, head: bytes) -> Text:
             raise IdentificationError(f"{source}: not a CSV table: {reason}") from error
         return Text(frame, notes, frozenset(twice))
     raise IdentificationError(f"{source}: not a CSV table: no text of a known encoding")
+
+
+def _strange_lines(source: Path, encoding: str, dialect: Dialect, notes: list[str]) -> list[int]:
+    """Return the numbers, from 0, of lines that are no rows, and notes on how many there are.
+
+    Two rows on one line, a row that is cut, names that stand there again: each costs itself alone.
+    Where rows are short as a rule their last columns are missing, and they are kept.
+    """
+    others: dict[str, list[int]] = {"wide": [], "short": [], "names": []}
+    rows = 0
+    with source.open(encoding=encoding) as file:
+        for number, line in enumerate(file):
+            if number < dialect.first:
+                continue
+            if COMMENT in line:
+                line = line.partition(COMMENT)[0]
+            if not line.strip():
+                continue
+            rows += 1
+            width = _width(line, dialect.delimiter)
+            if width == dialect.width and line.strip()[:1] in _BEGINS_NUMBER:
+                continue
+            fields = _fields(line, dialect.delimiter)
+            while len(fields) > dialect.width and not fields[-1]:
+                fields.pop()  # the delimiter that ends every row
+            if dialect.names and tuple(fields) == dialect.names:
+                others["names"].append(number)
+            elif len(fields) > dialect.width:
+                others["wide"].append(number)
+            elif len(fields) < dialect.width - 1:
+                others["short"].append(number)
+    if len(others["short"]) > MOST_SHORT * rows:
+        notes.append(f"{len(others['short'])} of {rows} rows lack their last columns")
+        others["short"] = []
+    odd = sorted((*others["wide"], *others["short"]))
+    if odd:
+        notes.append(
+            f"{len(odd)} of {rows} rows have another width than the {dialect.width} names and were"
+            f" left out, the first in line {odd[0] + 1}"
+        )
+    if others["names"]:
+        notes.append(
+            f"the names stand there again in {len(others['names'])} lines, the first"
+            f" {others['names'][0] + 1}: left out"
+        )
+    return sorted((*odd, *others["names"]))
+
+
+def _width(line: str, delimiter: str) -> int:
+    """Return how many fields a line has, quickly; 0 where quotes have to be looked at."""
+    if delimiter == SPACES:
+        return len(line.split())
+    return 0 if '"' in line else line.count(delimiter) + 1
 
 
 def _encoding(source: Path, head: bytes) -> str:
@@ -132,10 +188,15 @@ def _written(lines: list[str], delimiter: str) -> Dialect | None:
     if not all(_number(f) for f in fields):
         return Dialect(delimiter, number + 1, tuple(fields), width, score)
     # Names may stand behind a comment sign, or lack the delimiter that ends every row.
-    for line in reversed(lines[:number]):
+    for at, line in reversed(list(enumerate(lines[:number]))):
         names = _fields(line.lstrip(COMMENT), delimiter)
-        if len(names) in (width, width - 1) and not any(_number(f) for f in names if f):
-            return Dialect(delimiter, number, tuple(names), width, score)
+        while len(names) > width and not names[-1]:
+            names.pop()  # a comma behind the last name
+        # Where most rows lack a slow sensor at their end, names are as wide as whole rows.
+        whole = len(names) > width and widths[len(names)] > 1
+        if (whole or len(names) in (width, width - 1)) and not any(_number(f) for f in names if f):
+            first = at + 1 if whole else number
+            return Dialect(delimiter, first, tuple(names), max(width, len(names)), score)
     return Dialect(delimiter, number, (), width, score)
 
 
