@@ -12,9 +12,11 @@ from host.errors import IdentificationError
 from host.readers.autopilot_flight import AutopilotFlight, read_autopilot
 from host.readers.autopilot_log import FlightChoiceError
 from host.readers.clock_epochs import clock_sets, epoch_starts
-from host.sysid.flight.flight_tables import FlightColumns, read_flight_columns
+from host.sysid.flight import FlightColumns, read_flight_columns
 
 from tests.host.readers import changed_logs as logs
+
+pytestmark = pytest.mark.costs(30, "the first of them flies the virtual flight, which is kept")
 
 
 def assert_same(found: AutopilotFlight, control: AutopilotFlight, *, late_s: float = 0.0) -> None:
@@ -135,11 +137,11 @@ def test_a_counter_that_begins_again(period_s: float, tmp_path: Path) -> None:
     found = read_table(tmp_path / "wrap.csv", logs.lines(wrapped))
     assert any("begins again" in note and "counted on" in note for note in found.notes)
     t, true = found.columns["t_s"], control.columns["t_s"]
-    rows = slice(0, len(true) - 2)  # the last may round to a row less
-    np.testing.assert_allclose((t - t[0])[rows], (true - true[0])[rows], atol=1e-5)
+    most = slice(0, len(true) - 2)  # the last may round to a row less
+    np.testing.assert_allclose((t - t[0])[most], (true - true[0])[most], atol=1e-5)
     for name in ("q_radps", "az_mps2"):
         np.testing.assert_allclose(
-            found.columns[name][rows], control.columns[name][rows], atol=1e-2
+            found.columns[name][most], control.columns[name][most], atol=1e-2
         )
 
 

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.sysid.flight.flight_tables import FlightColumns, read_flight_columns
+from host.sysid.flight import FlightColumns, read_flight_columns
 
 from tests.host.readers import changed_logs as logs
+
+pytestmark = pytest.mark.costs(30, "the first of them flies the virtual flight, which is kept")
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from host.arrays import Array
+from host.arrays import Array, BoolArray
 from host.constants import RAD_PER_DEG
 from host.physical.airdata import KELVIN, density_kgpm3
 from host.readers.ardupilot_outputs import moves_a_surface, surfaces
@@ -77,7 +77,7 @@ def _attitude(log: AutopilotLog, found: Channels) -> None:
 
 def _air(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
     baro = instance_of(log, "BARO", chosen, found.notes)
-    pitot = instance_of(log, "ARSP", chosen, found.notes)
+    pitot = _pitot(log, chosen, found.notes)
     if baro is not None and "Press" in baro[0].fields:
         messages, label = baro
         warm = STANDARD_TEMPERATURE_DEGC
@@ -95,12 +95,42 @@ def _air(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
         return
     messages, label = pitot
     indicated = numbers(messages.fields["Airspeed"])
-    if "H" in messages.fields:
-        indicated = np.where(np.asarray(messages.fields["H"]) > 0, indicated, np.nan)
+    indicated = np.where(_healthy(messages), indicated, np.nan)
     share = found.true_over_indicated(messages.t_s)
     found.add("airspeed_mps", messages.t_s, indicated * share, f"{label}.Airspeed, true")
     qbar = 0.5 * STANDARD_DENSITY_KGPM3 * indicated**2
     found.add("qbar_pa", messages.t_s, qbar, f"{label}.Airspeed")
+
+
+def _pitot(
+    log: AutopilotLog, chosen: Mapping[str, int], notes: list[str]
+) -> tuple[Messages, str] | None:
+    """Return the pitot asked for, else the autopilot's primary one if it was well and used."""
+    every = log.messages.get("ARSP", {})
+    said = [numbers(m.fields["Pri"]) for m in every.values() if "Pri" in m.fields]
+    if "ARSP" in chosen or len(every) < 2 or not said:
+        return instance_of(log, "ARSP", chosen, notes)
+    primary = int(np.median(np.concatenate(said)))
+
+    def worth(number: int) -> tuple[float, float, bool, int]:
+        one = every[number]
+        well = float(np.mean(_healthy(one)))
+        used = float(np.mean(numbers(one.fields.get("U", np.ones(len(one)))) > 0))
+        return round(well, 1), round(used, 1), number == primary, len(one)
+
+    best = max(sorted(every, reverse=True), key=worth)
+    notes.append(
+        f"ARSP {best} of {len(every)} is used, by its health, its use and the primary"
+        f" ({primary}); others: "
+        + ", ".join(f"--sensor ARSP={k}" for k in sorted(every) if k != best)
+    )
+    return every[best], f"ARSP[{best}]"
+
+
+def _healthy(messages: Messages) -> BoolArray:
+    """Return where the autopilot held a pitot for healthy."""
+    said = messages.fields.get("H", messages.fields.get("Health"))
+    return np.ones(len(messages), dtype=bool) if said is None else np.asarray(said) > 0
 
 
 def _gps(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:

@@ -22,7 +22,7 @@ from host.readers.plausible_times import plausible_times
 
 # What is read of a log, and which fields of it (of outputs all).
 _INERTIAL = ("TimeUS", "TimeMS", "I", "GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ")
-_AIRSPEED = ("TimeUS", "TimeMS", "I", "Airspeed", "Temp", "H")
+_AIRSPEED = ("TimeUS", "TimeMS", "I", "Airspeed", "Temp", "H", "Health", "U", "Pri")
 _BARO = ("TimeUS", "TimeMS", "I", "Alt", "Press", "GndTemp")
 _GPS = ("TimeUS", "TimeMS", "T", "I", "Status", "Spd", "GCrs", "VZ")
 WANTED: dict[str, tuple[str, ...]] = {

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from host.arrays import Array
+from host.arrays import Array, BoolArray
 from host.physical.airdata import KELVIN, density_kgpm3
 from host.readers.ardupilot_outputs import Outputs
 from host.readers.autopilot_log import AutopilotLog, Messages
@@ -21,6 +21,8 @@ from host.readers.signals import Signal
 
 FIXED_WING = 2  # vehicle_status.VEHICLE_TYPE_FIXED_WING
 MOST_PINS = 16
+RAW_AIRSPEED = "airspeed"  # before the scale that the autopilot knows
+PITOTS = 3  # airspeed_validated.airspeed_source: 1 to 3 are sensors, 4 is computed, 0 and -1 none
 USABLE_HZ = 18.0  # a topic that comes slower is used only if no other has the channel
 RATES = ("p_radps", "q_radps", "r_radps")
 FORCES = ("ax_mps2", "ay_mps2", "az_mps2")
@@ -148,7 +150,7 @@ def _air(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
     if log.parameters.get("SYS_HAS_NUM_ASPD", 1.0) == 0.0:
         return
     best: tuple[float, Messages, str] | None = None
-    for topic in ("airspeed_validated", "airspeed"):
+    for topic in ("airspeed_validated", RAW_AIRSPEED):
         pitot = instance_of(log, topic, chosen, found.notes)
         if pitot is None or "true_airspeed_m_s" not in pitot[0].fields or len(pitot[0]) < 2:
             continue
@@ -158,20 +160,74 @@ def _air(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
     if best is None:
         return
     _, messages, label = best
-    true = numbers(messages.fields["true_airspeed_m_s"])
+    number = _sensor_number(log)
+    scale = 1.0
+    if label.startswith(RAW_AIRSPEED + "["):
+        messages, label, scale = _raw_airspeed(log, chosen, messages, label, number)
+    true = scale * numbers(messages.fields["true_airspeed_m_s"])
     measured = messages.fields.get("airspeed_sensor_measurement_valid")
-    source = messages.fields.get("airspeed_source", messages.fields.get("selected_airspeed_index"))
     if measured is not None:
         true = np.where(np.asarray(measured) > 0, true, np.nan)
-    elif source is not None:  # below one: from ground speed and wind, no sensor
-        true = np.where(np.asarray(source) > 0, true, np.nan)
+    if number is not None:
+        row = np.searchsorted(number.t_s, messages.t_s, side="right") - 1
+        true = np.where(_is_sensor(number.values)[np.maximum(row, 0)], true, np.nan)
+        found.notes += _computed_airspeed(number)
     found.add("airspeed_mps", messages.t_s, true, f"{label}.true_airspeed_m_s")
     name = "calibrated_airspeed_m_s"
     name = name if name in messages.fields else "indicated_airspeed_m_s"
     if name in messages.fields and np.isfinite(true).any():
-        speed = numbers(messages.fields[name])
+        speed = scale * numbers(messages.fields[name])
         pressure = 0.5 * STANDARD_DENSITY_KGPM3 * np.where(np.isfinite(true), speed, np.nan) ** 2
         found.add("qbar_pa", messages.t_s, pressure, f"{label}.{name}")
+
+
+def _sensor_number(log: AutopilotLog) -> Signal | None:
+    """Return which pitot the autopilot uses, from 1, over time; others are computed, or none."""
+    said = log.first("airspeed_validated")
+    for name in ("airspeed_source", "selected_airspeed_index"):
+        if said is not None and name in said.fields:
+            return Signal(said.t_s, numbers(said.fields[name]), f"airspeed_validated.{name}")
+    return None
+
+
+def _is_sensor(number: Array) -> BoolArray:
+    return np.asarray((number >= 1) & (number <= PITOTS))
+
+
+def _raw_airspeed(
+    log: AutopilotLog,
+    chosen: Mapping[str, int],
+    messages: Messages,
+    label: str,
+    number: Signal | None,
+) -> tuple[Messages, str, float]:
+    """Return the raw topic of the pitot that the autopilot used most, and the scale of its own."""
+    used = number.values[_is_sensor(number.values)] if number is not None else np.zeros(0)
+    pitot = int(np.median(used)) if len(used) else 1
+    every = log.messages[RAW_AIRSPEED]
+    if RAW_AIRSPEED in chosen:
+        pitot = chosen[RAW_AIRSPEED] + 1
+    elif pitot - 1 in every:
+        messages, label = every[pitot - 1], f"{RAW_AIRSPEED}[{pitot - 1}]"
+    old = log.parameters.get("ASPD_SCALE", 1.0)  # until v1.12
+    return messages, label, log.parameters.get(f"ASPD_SCALE_{pitot}", old)
+
+
+def _computed_airspeed(number: Signal) -> list[str]:
+    """Return a line on when the airspeed is no pitot's, or nothing."""
+    sensor = _is_sensor(number.values)
+    if sensor.all() or not sensor.any():
+        return []
+    first = int(np.argmax(~sensor & (np.arange(len(sensor)) > np.argmax(sensor))))
+    first = first if not sensor[first] else int(np.argmin(sensor))
+    until = "on" if not sensor[first:].any() else (
+        f"to {number.t_s[first + int(np.argmax(sensor[first:]))]:.1f} s"
+    )  # fmt: skip
+    return [
+        f"airspeed is no pitot's from {number.t_s[first]:.1f} s {until}"
+        f" ({number.source.partition('.')[2]} {number.values[first]:.0f}): missing"
+        f" for {100.0 * np.mean(~sensor):.0f} % of the log"
+    ]
 
 
 def _path(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:

@@ -338,4 +338,6 @@ def _times(name: str, fields: Fields, station: _Station) -> Array:
     places, stamps = fields.pop(PLACE), fields.pop(STAMP, None)
     for stamp in ("time_boot_ms", "time_usec"):
         fields.pop(stamp, None)
-    return own_s if own_s is not None else station.since_boot_s(stamps, places)
+    if own_s is not None:
+        return own_s
+    return station.since_boot_s(np.asarray(stamps, dtype=np.float64), places)

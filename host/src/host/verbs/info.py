@@ -68,8 +68,8 @@ def _maneuvers(source: Path, number: int) -> int | None:
     """Return how many test points a flight of a log has; None if nothing can be said of it."""
     from host.errors import HostError
     from host.readers.flight_choice import with_flight
-    from host.sysid.flight.flight_tables import read_columns
-    from host.sysid.maneuvers.maneuver_detection import detect_maneuvers
+    from host.sysid.flight import read_columns
+    from host.sysid.maneuvers import detect_maneuvers
 
     try:
         columns, _ = read_columns(*with_flight([source], number))
