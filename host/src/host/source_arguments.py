@@ -33,12 +33,15 @@ def add_log_arguments(parser: argparse.ArgumentParser) -> None:
 
 def add_flight(parser: argparse.ArgumentParser, *, every: bool = False) -> None:
     """Add the choice among the flights of a log; `every` where several are fitted jointly."""
-    from host.readers.flight_choice import flight_argument
-
     more = ", or 'all', fitted together" if every else ""
     parser.add_argument("--flight", "--session", type=flight_argument if every else int,
                         metavar="N", help="flight N of a log with several, as `host info` lists"
                         f" them{more}; that with the longest time in the air without")  # fmt: skip
+
+
+def flight_argument(text: str) -> int | str:
+    """Return the number of a flight, or ``all``; argparse names this function in its error."""
+    return text if text == "all" else int(text)
 
 
 def add_sensor(parser: argparse.ArgumentParser) -> None:

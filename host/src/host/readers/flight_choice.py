@@ -21,17 +21,6 @@ def file_and_flight(source: Path) -> tuple[Path, int | None]:
     return source, None
 
 
-def flight_argument(text: str) -> int | str:
-    """Return what ``--flight`` was given: a number, or ``all``.
-
-    Raises
-    ------
-    ValueError
-        If it is neither; argparse says so.
-    """
-    return ALL if text == ALL else int(text)
-
-
 def with_flight(sources: list[Path], flight: int | str | None) -> list[Path]:
     """Return the sources that a choice of ``--flight`` makes of files: with ``all`` each flight.
 
