@@ -72,7 +72,7 @@ def test_other_shells_get_a_script_with_every_verb(
     [
         ("export x --to tlogg", "argument --to: no 'tlogg' (did you mean tlog?); there are tlog,"),
         ("card wite", "argument do: no 'wite' (did you mean write?)"),
-        ("decode --session one", "argument --session: invalid int value: 'one'"),
+        ("decode --session one", "argument --flight/--session: invalid int value: 'one'"),
         ("convert", "the following arguments are required: source, --aircraft"),
     ],
 )

@@ -318,7 +318,7 @@ def sources(kind: str) -> list[bytes]:
         Path("foreign.csv").write_text(f"TimeUS,AOA,Nz,q,de\n{rows}")
         return [MAP]
     if kind == "model":
-        return [MODEL, (package / "sysid/coefficients/standard.toml").read_bytes()]
+        return [MODEL, (package / "sysid/models/standard_coefficients.toml").read_bytes()]
     if kind == "prior":
         return [PRIOR, DERIVATIVES]
     return [p.read_bytes() for p in sorted((package / "twin/testcard/cards").glob("*.toml"))]

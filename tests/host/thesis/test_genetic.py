@@ -11,6 +11,7 @@ from studies.data import TRUTH, noisy
 pytestmark = pytest.mark.usefixtures("machine_code")
 
 
+@pytest.mark.costs(20, "sixty generations of a search")
 def test_genetic_search_finds_the_valley_from_far_away() -> None:
     far = navion_structured().with_start(np.array([0, 0, 0, -1, 0, -1, -1, 0, -1.0]))
     bounded = dataclasses.replace(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from host.errors import ExitCode, UsageError
 from host.extras import install_hint
 from host.terminal import command_line
-from host.verbs.plan_lines import (
+from host.verbs._plan_lines import (
     NO_SIGN_PERCENT,
     point_as_json,
     print_intervals,

@@ -72,7 +72,7 @@ OF_COLUMNS: dict[str, tuple[str, Change]] = {
 }
 LATER = {
     "small-inputs", "feedback", "flow-angles", "calibration", "sensor-agreement", "surface-rate",
-    "instrument-errors", "airspeed-scale",
+    "instrument-errors", "airspeed-scale", "time-digits",
 }  # fmt: skip
 
 

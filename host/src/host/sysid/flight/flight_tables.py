@@ -152,7 +152,7 @@ def read_flight_columns(
         return FlightColumns(columns, notes, found.recording, found.calibration)
     timing: list[Finding] = []
     if not found.shares:  # a table: an autopilot's log is read clock by clock
-        used = _timed(used, source, notes, timing)
+        used = _timed(used, source, notes, timing, accept)
     seen = _measured(used, notes, accept)
     even = even_grid(seen.columns, notes)
     columns, findings = checked(even, accept)
@@ -204,7 +204,11 @@ def _refuse_unusable(
 
 
 def _timed(
-    columns: dict[str, Array], source: Any, notes: list[str], findings: list[Finding]
+    columns: dict[str, Array],
+    source: Any,
+    notes: list[str],
+    findings: list[Finding],
+    accept: Collection[str],
 ) -> dict[str, Array]:
     """Return the rows of one recording with times that go on, and a finding where they were made
     even."""
@@ -216,16 +220,15 @@ def _timed(
         return columns
     t_s, digit_s = even
     rate_hz = 1.0 / float(t_s[1] - t_s[0])
-    findings.append(
-        Finding(
-            "time-digits",
-            (),
-            f"t_s has digits of {digit_s:.3g} s where rows come at {rate_hz:.4g} Hz",
-            ("a time that was written with too few digits",),
-            done="rows are timed evenly, which agrees with every digit",
-        )
-    )
-    return columns | {"t_s": t_s}
+    found = Finding(
+        "time-digits",
+        (),
+        f"t_s has digits of {digit_s:.3g} s where rows come at {rate_hz:.4g} Hz",
+        ("a time that was written with too few digits",),
+        done="rows are timed evenly, which agrees with every digit",
+    ).accepted_if(accept)
+    findings.append(found)
+    return columns if found.accepted else columns | {"t_s": t_s}
 
 
 def _measured(columns: dict[str, Array], notes: list[str], accept: Collection[str]) -> Measured:
