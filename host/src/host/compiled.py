@@ -27,7 +27,7 @@ from host.resources import user_cache
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
-# numba's own start, an instruction, a loop: seven kernels of equations, tests/bench/README.md
+# numba's own start, an instruction, a loop: six kernels of equations, tests/bench/README.md
 LOADING_S, INSTRUCTION_S, LOOP_S = 0.5, 0.0007, 0.2
 A_WAIT_S = 4.0  # what is said of a later kernel too
 SLOWER = "100 to 400"  # times: the card `calm` in flight 103, the printed Hopfield iteration 410
