@@ -9,6 +9,7 @@ Machines, and one machine with neighbours, differ by `SLOWER`.
 
 import os
 import signal
+import time
 from collections.abc import Generator
 
 import pytest
@@ -21,7 +22,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 MOST_CPU_S = 10.0  # of a case, what it makes for later ones included
 SLOWER = 2.0
-_BEGUN = pytest.StashKey[float]()
+_BEGUN = pytest.StashKey[tuple[float, float]]()
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -29,16 +30,17 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "costs(seconds, why): processor time it may take, and why")
 
 
-def _processor_time_s() -> float:
-    """Return what this process and those that it waited for have used."""
+def _times_s() -> tuple[float, float]:
+    """Return processor time of this process and those that it waited for, and the time."""
     used = os.times()
-    return used.user + used.system + used.children_user + used.children_system
+    spent_s = used.user + used.system + used.children_user + used.children_system
+    return spent_s, time.monotonic()
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Note when a case begins: before what it shares with later cases is made."""
-    item.stash[_BEGUN] = _processor_time_s()
+    item.stash[_BEGUN] = _times_s()
 
 
 @pytest.hookimpl(wrapper=True)
@@ -48,7 +50,10 @@ def pytest_runtest_makereport(
     """Write processor time into the report of the case; fail one that takes too much."""
     if call.when != "teardown":
         return (yield)
-    used_s = _processor_time_s() - item.stash[_BEGUN]
+    spent_s, at_s = _times_s()
+    spent_before_s, begun_s = item.stash[_BEGUN]
+    # A process that an earlier case left to itself is waited for in a later one: not its time.
+    used_s = min(spent_s - spent_before_s, (at_s - begun_s) * (os.cpu_count() or 1))
     item.user_properties.append(("cpu_s", f"{used_s:.2f}"))
     report = yield
     mark = item.get_closest_marker("costs")

@@ -100,6 +100,24 @@ def test_a_case_beyond_its_processor_time_has_failed(tmp_path: Path, mark: str, 
     assert ("s of processor time, at most 0 s" in done.stdout) == bool(code)
 
 
+def test_a_process_of_an_earlier_case_costs_a_later_one_nothing(tmp_path: Path) -> None:
+    text = (ROOT / "tests" / "conftest.py").read_text()
+    (tmp_path / "conftest.py").write_text(text.replace("MOST_CPU_S = 10.0", "MOST_CPU_S = 0.2"))
+    (tmp_path / "test_two.py").write_text(
+        "import os, subprocess, sys\n"
+        "BUSY = 'import time\\nwhile time.process_time() < 1.0: pass'\n"
+        "LEFT = []\n"
+        "def test_first():\n"
+        "    LEFT.append(subprocess.Popen([sys.executable, '-c', BUSY]))\n"
+        "    os.waitid(os.P_PID, LEFT[0].pid, os.WEXITED | os.WNOWAIT)  # ended, not waited for\n"
+        "def test_second():\n"
+        "    LEFT[0].wait()\n"
+    )
+    command = (sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider")
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+
+
 def test_a_stage_without_its_report_has_failed(runner: ModuleType) -> None:
     stage = runner.Stage("a", "no cases", (python("pass"),), report=True)
     outcome = runner.run(stage, {})
