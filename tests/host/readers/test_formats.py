@@ -77,7 +77,10 @@ def test_ulog_is_what_pyulog_reads(tmp_path: Path) -> None:
         assert (ours.dropouts, ours.dropped_ms) == (
             len(theirs.dropouts), sum(one.duration for one in theirs.dropouts),
         )  # fmt: skip
-        assert ours.parameters == {k: float(v) for k, v in theirs.initial_parameters.items()}
+        first = {name: value for name, value, _ in reversed(ours.written)}
+        assert first == {k: float(v) for k, v in theirs.initial_parameters.items()}
+        later = [(name, value) for name, value, at_us in ours.written if at_us > 0.0]
+        assert later == [(name, float(v)) for _, name, v in theirs.changed_parameters]
         assert ours.said == {k: v for k, v in theirs.msg_info_dict.items() if k in SAID}
         found = {(t.name, t.instance): t for t in ours.topics if t.data}
         assert len(found) == len(theirs.data_list) > 5

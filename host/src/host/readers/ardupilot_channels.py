@@ -21,6 +21,7 @@ from host.readers.named_channels import (
     instance_of,
     numbers,
 )
+from host.readers.written_parameters import made_of_outputs
 
 FIX_3D = 3
 SERVO_HZ = 50.0
@@ -149,11 +150,17 @@ def _gps(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
 
 
 def _outputs(log: AutopilotLog, found: Channels) -> None:
-    out = next((m for n in OUTPUTS if (m := log.first(n)) is not None and _moves(m, log)), None)
+    out = next(
+        (m for n in OUTPUTS if (m := log.first(n)) is not None and _moves(m, log.parameters)), None
+    )
     out = out or log.first(*OUTPUTS)
     if out is None:
         return
-    made = surfaces(_pulses(log, out), log.parameters)
+    made = made_of_outputs(
+        out.t_s,
+        log.parameters,
+        lambda rows, stood: surfaces(_pulses(log, out.t_s[rows], stood), stood),
+    )
     found.output_period_s = 1.0 / max(log.parameters.get("SERVO_RATE", SERVO_HZ), 1.0)
     for name, share in made.shares.items():
         found.add(name, out.t_s, share, made.made_of[name])
@@ -167,13 +174,13 @@ def _outputs(log: AutopilotLog, found: Channels) -> None:
         found.notes.append("no SERVOn_FUNCTION in the log names a surface: outputs have no meaning")
 
 
-def _moves(messages: Messages, log: AutopilotLog) -> list[tuple[str, int]]:
+def _moves(messages: Messages, parameters: Mapping[str, float]) -> list[tuple[str, int]]:
     """Return the fields that move a surface or a motor, and the number of each output."""
     named = [(f, int(f[1:])) for f in messages.fields if f[:1] == "C" and f[1:].isdigit()]
-    return [(field, number) for field, number in named if moves_a_surface(number, log.parameters)]
+    return [(field, number) for field, number in named if moves_a_surface(number, parameters)]
 
 
-def _pulses(log: AutopilotLog, first: Messages) -> dict[int, Array]:
+def _pulses(log: AutopilotLog, t_s: Array, parameters: Mapping[str, float]) -> dict[int, Array]:
     """Return the pulses of all outputs that move something, at the instants of one message.
 
     The autopilot writes the messages of a set one behind the other.
@@ -181,10 +188,10 @@ def _pulses(log: AutopilotLog, first: Messages) -> dict[int, Array]:
     pulses: dict[int, Array] = {}
     for name in OUTPUTS:
         messages = log.first(name)
-        moved = _moves(messages, log) if messages is not None else []
+        moved = _moves(messages, parameters) if messages is not None else []
         if messages is None or not moved:
             continue
-        row = np.searchsorted(messages.t_s, first.t_s + SAME_SET_S, side="right") - 1
+        row = np.searchsorted(messages.t_s, t_s + SAME_SET_S, side="right") - 1
         before = row < 0
         for field, number in moved:
             values = numbers(messages.fields[field])[np.maximum(row, 0)]

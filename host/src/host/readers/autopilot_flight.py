@@ -26,6 +26,7 @@ from host.readers.mavlink_channels import mavlink_channels
 from host.readers.named_channels import Channels
 from host.readers.px4_channels import not_flying_signals, px4_channels
 from host.readers.signals import Signal
+from host.readers.written_parameters import Parameters
 
 SURFACES = ("elevator", "aileron", "rudder")
 CLOCK_SHARE = 5e-5  # one deviation of a crystal of 50 ppm
@@ -200,7 +201,8 @@ def read_autopilot(
 
 def _flight(log: AutopilotLog, sensors: Mapping[str, int]) -> AutopilotFlight:
     channels, not_flying = _channels(log, sensors)
-    channels.notes[:0] = log.remarks
+    changed = log.parameters.lines() if isinstance(log.parameters, Parameters) else []
+    channels.notes[:0] = [*log.remarks, *changed]
     flown = airborne(channels, not_flying)
     return AutopilotFlight(log, channels, flown, judge(log, channels, flown))
 

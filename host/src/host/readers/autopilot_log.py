@@ -56,6 +56,11 @@ class Messages:
         return len(self.t_s)
 
 
+def last_time_s(messages: Mapping[str, Mapping[int, Messages]]) -> float:
+    """Return the time of the last of all messages, s; 0 without any."""
+    return max((float(m.t_s[-1]) for every in messages.values() for m in every.values()), default=0)
+
+
 @dataclass(frozen=True, slots=True)
 class AutopilotLog:
     """A log as it was read.
@@ -74,6 +79,7 @@ class AutopilotLog:
     messages : mapping of str to mapping of int to Messages
         By name and instance.
     parameters : mapping of str to float
+        Of one that changed the value that stood longest; `Parameters` has all.
     damage : tuple of str
         A sentence for each loss, error or unproven range.
     lost : int

@@ -14,11 +14,17 @@ from numpy.typing import NDArray
 
 from host.arrays import Array, IntArray
 from host.progress import progress_bar
-from host.readers.autopilot_log import AutopilotLog, Messages, NotAutopilotLogError
+from host.readers.autopilot_log import (
+    AutopilotLog,
+    Messages,
+    NotAutopilotLogError,
+    last_time_s,
+)
 from host.readers.clock_epochs import clock_origin_s, epoch_starts
 from host.readers.dataflash_binary import read_records
 from host.readers.dataflash_text import read_text_records
 from host.readers.plausible_times import plausible_times
+from host.readers.written_parameters import Parameters
 
 # What is read of a log, and which fields of it (of outputs all).
 _INERTIAL = ("TimeUS", "TimeMS", "I", "GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ")
@@ -90,7 +96,8 @@ def read_dataflash(path: Path, *, text: bool) -> list[AutopilotLog]:
         If it holds no record.
     """
     damage: list[str] = []
-    found, lost = _text(path, damage) if text else _binary(path, damage)
+    remarks: list[str] = []
+    found, lost = _text(path, damage, remarks) if text else _binary(path, damage)
     if not any(len(table) for table in found):
         raise NotAutopilotLogError(
             f"{path}: begins as a DataFlash log but holds no whole record; is it cut?"
@@ -99,18 +106,24 @@ def read_dataflash(path: Path, *, text: bool) -> list[AutopilotLog]:
     ends = [0, *epoch_starts(timed), np.iinfo(np.int64).max]
     form = "dataflash-text" if text else "dataflash"
     if len(ends) == 2:
-        return [_log(path, form, found, damage, lost)]
+        return [_log(path, form, found, damage, lost, remarks)]
     return [
-        _log(path, form, [table.between(first, end) for table in found], list(damage), lost)
-        for first, end in pairwise(ends)
+        _log(
+            path, form, [table.between(a, b) for table in found], list(damage), lost, list(remarks)
+        )
+        for a, b in pairwise(ends)
     ]
 
 
 def _log(
-    path: Path, form: str, found: Sequence[_Table], damage: list[str], lost: int
+    path: Path,
+    form: str,
+    found: Sequence[_Table],
+    damage: list[str],
+    lost: int,
+    remarks: list[str],
 ) -> AutopilotLog:
     """Return what one start of the autopilot wrote."""
-    remarks: list[str] = []
     tables = _defined_once(found, remarks)
     every = [t for table in tables.values() if (t := table.times()) is not None]
     origin_s = clock_origin_s(every)
@@ -130,7 +143,7 @@ def _log(
         vehicle=_vehicle(firmware),
         firmware=firmware,
         messages=messages,
-        parameters=_parameters(fields),
+        parameters=_parameters(tables.get("PARM"), origin_s, last_time_s(messages)),
         damage=tuple(damage),
         lost=lost,
         texts=tuple(texts),
@@ -185,10 +198,11 @@ def _binary(path: Path, damage: list[str]) -> tuple[list[_Table], int]:
     return tables, len(found.lost)
 
 
-def _text(path: Path, damage: list[str]) -> tuple[list[_Table], int]:
+def _text(path: Path, damage: list[str], remarks: list[str]) -> tuple[list[_Table], int]:
     found = read_text_records(path, WANTED)
     if found.bad_lines:
         damage.append(f"{found.bad_lines} lines are no records and were left out")
+    remarks += [f"{name} is defined twice: the first definition counts" for name in found.twice[:5]]
     tables = [
         _Table(name, 0, found.lines[name], _of_their_kind(name, fields))
         for name, fields in found.tables.items()
@@ -246,7 +260,14 @@ def _vehicle(line: str) -> str:
     return ""
 
 
-def _parameters(tables: Mapping[str, Mapping[str, NDArray[Any]]]) -> dict[str, float]:
-    found = tables.get("PARM", {})
-    names, values = found.get("Name", ()), found.get("Value", ())
-    return {_word(n): float(v) for n, v in zip(names, values, strict=False)}
+def _parameters(table: _Table | None, origin_s: float, end_s: float) -> Parameters:
+    """Return the parameters; what has no time within the log was written before."""
+    if table is None or not {"Name", "Value"} <= table.fields.keys():
+        return Parameters()
+    t_s = table.times()
+    if t_s is None:
+        t_s = np.zeros(len(table))
+    t_s = t_s - origin_s
+    times = np.where((t_s > 0.0) & (t_s <= end_s), t_s, 0.0).tolist()
+    names, values = map(_word, table.fields["Name"]), map(float, table.fields["Value"])
+    return Parameters(zip(names, values, times, strict=True), end_s)

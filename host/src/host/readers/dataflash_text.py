@@ -18,11 +18,13 @@ _LONGEST_LINE = 1024
 
 @dataclass(frozen=True, slots=True)
 class TextRecords:
-    """The fields of all records by kind, the line of each, and how many lines were none."""
+    """The fields of all records by kind, the line of each, how many lines were none, and which
+    kinds are defined again and otherwise."""
 
     tables: dict[str, dict[str, NDArray[Any]]]
     lines: dict[str, IntArray]
     bad_lines: int
+    twice: tuple[str, ...]
 
 
 def read_text_records(path: Path, wanted: Collection[str]) -> TextRecords:
@@ -30,6 +32,7 @@ def read_text_records(path: Path, wanted: Collection[str]) -> TextRecords:
     layouts: dict[str, tuple[str, list[str]]] = {}
     rows: dict[str, list[list[float | str]]] = {}
     places: dict[str, list[int]] = {}
+    twice: dict[str, None] = {}
     bad = 0
     with path.open(encoding="utf-8", errors="replace") as file:
         for number, line in enumerate(iter(lambda: file.readline(_LONGEST_LINE), "")):
@@ -37,7 +40,9 @@ def read_text_records(path: Path, wanted: Collection[str]) -> TextRecords:
             name = parts[0]
             if name == "FMT" and len(parts) > 5:
                 # Of two definitions the first counts: a script's rows are then no records.
-                layouts.setdefault(parts[3], (parts[4], parts[5:]))
+                own = parts[4], parts[5:]
+                if layouts.setdefault(parts[3], own) != own:
+                    twice[parts[3]] = None
             elif name in wanted:
                 row = _row(parts[1:], *layouts.get(name, ("", [])))
                 bad += row is None
@@ -52,7 +57,7 @@ def read_text_records(path: Path, wanted: Collection[str]) -> TextRecords:
         by_column = zip(*found, strict=True)
         tables[name] = {c: np.array(v) for c, v in zip(columns, by_column, strict=True)}
     lines = {name: np.array(every, dtype=np.int64) for name, every in places.items()}
-    return TextRecords(tables, lines, bad)
+    return TextRecords(tables, lines, bad, tuple(twice))
 
 
 def _row(parts: list[str], letters: str, columns: list[str]) -> list[float | str] | None:

@@ -13,9 +13,11 @@ import numpy as np
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.physical.airdata import KELVIN, density_kgpm3
-from host.readers.ardupilot_outputs import moves_a_surface, surfaces
+from host.readers.ardupilot_outputs import Outputs, moves_a_surface, surfaces
 from host.readers.autopilot_log import AutopilotLog, Messages
 from host.readers.named_channels import STANDARD_DENSITY_KGPM3, Channels, instance_of, numbers
+from host.readers.px4_outputs import surfaces_of_pulses
+from host.readers.written_parameters import made_of_outputs
 
 MILLI = 1e-3
 IMUS = (("RAW_IMU", MILLI), ("SCALED_IMU", MILLI), ("SCALED_IMU2", MILLI), ("HIGHRES_IMU", 1.0))
@@ -94,17 +96,30 @@ def _outputs(log: AutopilotLog, found: Channels) -> None:
     pulses = {
         k: _field(out, f"servo{k}_raw")
         for k in range(1, MOST_SERVOS + 1)
-        if f"servo{k}_raw" in out.fields and moves_a_surface(k, log.parameters)
+        if f"servo{k}_raw" in out.fields
     }
-    made = surfaces(pulses, log.parameters)
+    made, by = _surfaces(log, out.t_s, pulses)
     found.output_period_s = 1.0 / max(log.parameters.get("SERVO_RATE", 50.0), 1.0)
     for name, share in made.shares.items():
         found.add(name, out.t_s, share, made.made_of[name])
     found.clipped |= {name: many for name, many in made.clipped.items() if many}
     said = "; ".join(f"{name} of {how}" for name, how in made.made_of.items())
     found.notes.append(
-        f"surfaces by SERVOn_ parameters: {said}"
+        f"surfaces by {by} parameters: {said}"
         if said
         else "no SERVOn_FUNCTION came over the radio: outputs have no meaning; fetch the parameters"
         " in the ground station while it records"
     )
+
+
+def _surfaces(log: AutopilotLog, t_s: Array, pulses: Mapping[int, Array]) -> tuple[Outputs, str]:
+    """Return the surfaces behind pulses, and which parameters said so."""
+
+    def made(rows: slice, stood: Mapping[str, float]) -> Outputs:
+        own = {k: values[rows] for k, values in pulses.items()}
+        if log.autopilot == "px4":
+            return surfaces_of_pulses(own, stood)
+        return surfaces({k: v for k, v in own.items() if moves_a_surface(k, stood)}, stood)
+
+    by = "PWM_ and CA_SV_" if log.autopilot == "px4" else "SERVOn_"
+    return made_of_outputs(t_s, log.parameters, made), by

@@ -17,7 +17,7 @@ WANTED: dict[str, tuple[str, ...]] = {
     "SERVO_OUTPUT_RAW": ("time_usec", "port", *_SERVOS), "VFR_HUD": ("airspeed",),
     "SCALED_PRESSURE": ("time_boot_ms", "press_abs", "press_diff", "temperature"),
     "GLOBAL_POSITION_INT": ("time_boot_ms", "vx", "vy", "vz"),
-    "PARAM_VALUE": ("param_id", "param_value"), "STATUSTEXT": ("text",),
+    "PARAM_VALUE": ("param_id", "param_value", "param_type"), "STATUSTEXT": ("text",),
 }  # fmt: skip
 _TYPES = {
     "char": "S", "uint8_t": "u1", "int8_t": "i1", "uint16_t": "<u2", "int16_t": "<i2",

@@ -15,9 +15,14 @@ from host.physical.airdata import KELVIN, density_kgpm3
 from host.readers.ardupilot_outputs import Outputs
 from host.readers.autopilot_log import AutopilotLog, Messages
 from host.readers.named_channels import STANDARD_DENSITY_KGPM3, Channels, instance_of, numbers
-from host.readers.px4_outputs import MOST_SURFACES, allocated_surfaces, axis_demands
-from host.readers.px4_pulses import GROUPS, controls_of_pulses
+from host.readers.px4_outputs import (
+    MOST_SURFACES,
+    allocated_surfaces,
+    axis_demands,
+    surfaces_of_pulses,
+)
 from host.readers.signals import Signal
+from host.readers.written_parameters import made_of_outputs
 
 FIXED_WING = 2  # vehicle_status.VEHICLE_TYPE_FIXED_WING
 MOST_PINS = 16
@@ -251,7 +256,11 @@ def _outputs(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> N
             for k in range(MOST_SURFACES)
             if f"control[{k}]" in servos[0].fields
         }
-        out = allocated_surfaces(controls, log.parameters)
+        out = made_of_outputs(
+            servos[0].t_s,
+            log.parameters,
+            lambda rows, stood: allocated_surfaces(_rows(controls, rows), stood),
+        )
         if out.shares:
             made = servos[0], out
     for other in (_pulses, _axes):  # the pins' pulses, then the demand in front of the mixer
@@ -283,14 +292,20 @@ def _pulses(log: AutopilotLog, chosen: Mapping[str, int]) -> tuple[Messages, Out
             for k in range(MOST_PINS)
             if f"output[{k}]" in messages.fields
         }
-        for group in GROUPS:
-            controls = controls_of_pulses(pulses, log.parameters, group)
-            out = allocated_surfaces(controls, log.parameters)
-            if len(messages) > 1 and out.shares:
-                by = f"{group} of actuator_outputs[{instance}]"
-                made_of = {name: f"{how} ({by})" for name, how in out.made_of.items()}
-                return messages, Outputs(out.shares, made_of, out.clipped)
+        out = made_of_outputs(
+            messages.t_s,
+            log.parameters,
+            lambda rows, stood, pulses=pulses: surfaces_of_pulses(_rows(pulses, rows), stood),  # type: ignore[misc]
+        )
+        if len(messages) > 1 and out.shares:
+            by = f" of actuator_outputs[{instance}]"
+            made_of = {name: f"{how}{by}" for name, how in out.made_of.items()}
+            return messages, Outputs(out.shares, made_of, out.clipped)
     return None
+
+
+def _rows(outputs: Mapping[int, Array], rows: slice) -> dict[int, Array]:
+    return {number: values[rows] for number, values in outputs.items()}
 
 
 def _axes(log: AutopilotLog, _chosen: Mapping[str, int]) -> tuple[Messages, Outputs] | None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.readers.ardupilot_outputs import Outputs
+from host.readers.px4_pulses import GROUPS, controls_of_pulses
 
 TYPES = {
     1: "left aileron", 2: "right aileron", 3: "elevator", 4: "rudder", 5: "left elevon",
@@ -77,6 +78,25 @@ def allocated_surfaces(controls: Mapping[int, Array], parameters: Mapping[str, f
     if both("left flap", "right flap"):
         put("flap", 0.5 * (value["left flap"] + value["right flap"]), "left flap", "right flap")
     return Outputs(shares, made_of, clipped)
+
+
+def surfaces_of_pulses(pulses_us: Mapping[int, Array], parameters: Mapping[str, float]) -> Outputs:
+    """Return surfaces from the pulses of the pins, by the first group of pins that explains them.
+
+    Parameters
+    ----------
+    pulses_us : mapping of int to (n,) array
+        By pin, from 1.
+    parameters : mapping of str to float
+        PWM_MAIN_ or PWM_AUX_, and CA_SV_CSn_TYPE, among them.
+    """
+    for group in GROUPS:
+        controls = controls_of_pulses(pulses_us, parameters, group)
+        out = allocated_surfaces(controls, parameters)
+        if out.shares:
+            made_of = {name: f"{how} by {group}" for name, how in out.made_of.items()}
+            return Outputs(out.shares, made_of, out.clipped)
+    return Outputs({}, {}, {})
 
 
 def axis_demands(asked: Sequence[Array], of: str) -> Outputs:

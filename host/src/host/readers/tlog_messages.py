@@ -7,7 +7,7 @@ is a component of a system: what another component of the vehicle says is not th
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -18,15 +18,22 @@ from numpy.typing import NDArray
 
 from host.arrays import Array, BoolArray, IntArray
 from host.progress import progress_bar
-from host.readers.autopilot_log import AutopilotLog, Messages, NotAutopilotLogError
+from host.readers.autopilot_log import (
+    AutopilotLog,
+    Messages,
+    NotAutopilotLogError,
+    last_time_s,
+)
 from host.readers.clock_epochs import clock_sets, epoch_starts
 from host.readers.mavlink_frames import Frames, frames_of
 from host.readers.mavlink_layout import Layout, layouts
 from host.readers.plausible_times import plausible_times
 from host.readers.ulog_messages import BY_MAV_TYPE
+from host.readers.written_parameters import Parameters
 
 AUTOPILOTS = {3: "ardupilot", 12: "px4"}
 GROUND_STATION, NO_AUTOPILOT = 6, 8
+REAL32 = 9  # MAV_PARAM_TYPE
 WRAP_US = float(1 << 32)
 OTHER_CLOCK_S = 1e9  # a time since boot is shorter than thirty years
 PORTION_BYTES = 8 << 20  # read at a time
@@ -43,8 +50,9 @@ class _Received:
     parts: dict[tuple[int, str], list[Fields]] = field(default_factory=dict)
     frames: int = 0
     last_number: dict[int, int] = field(default_factory=dict)
-    lost: dict[int, int] = field(default_factory=dict)
-    many: dict[int, int] = field(default_factory=dict)
+    # Of each sender, portion by portion: its frames, and before which ones some are missing.
+    many: dict[int, list[NDArray[np.uint32]]] = field(default_factory=dict)
+    gaps: dict[int, list[IntArray]] = field(default_factory=dict)
     wrong_crc: int = 0
     strange_bytes: int = 0
 
@@ -91,7 +99,7 @@ def read_tlog(path: Path) -> list[AutopilotLog]:
             f"{path}: no frame of a vehicle (HEARTBEAT) in it; expected a MAVLink telemetry log"
         )
     sender = max(known, key=lambda s: many[s])
-    damage = _damage(received, sender)
+    damage = _damage(received)
     systems = {one >> 8 for one in known}
     if len(systems) > 1:
         damage.append(f"{len(systems)} vehicles speak in it; system {sender >> 8} is read")
@@ -101,22 +109,30 @@ def read_tlog(path: Path) -> list[AutopilotLog]:
         for name in [name for one, name in received.parts if one == sender]
     }
     received.parts.clear()
-    starts = epoch_starts(
+    timed = [
         (fields[PLACE], own_s)
         for name, fields in tables.items()
         if (own_s := _own_times(name, fields)) is not None
-    )
+    ]
+    starts = epoch_starts(timed)
+    # A sender that starts again numbers its frames anew: what seems lost there was never sent.
+    restarts = [(place, _first_place(timed, place)) for place in starts]
+    del timed
     kind, autopilot = known[sender]
     lost = received.wrong_crc + (1 if received.strange_bytes else 0)
     logs = []
+    written: list[tuple[list[tuple[str, float, float]], float]] = []
     for first, end in pairwise([0, *starts, received.frames]):
         own = {name: _between(fields, first, end) for name, fields in tables.items()}
         if len(starts) == 0:
             tables.clear()
-        own_damage, own_remarks = list(damage), list(remarks)
+        own_damage = damage + _lost(received, sender, first, end, restarts)
+        own_remarks = list(remarks)
         texts = _words(own.pop("STATUSTEXT", {}).get("text", ()))
-        values = own.pop("PARAM_VALUE", {})
-        words = _words(values.get("param_id", ()))
+        said = own.pop("PARAM_VALUE", {})
+        station = _Station(own, own_remarks)
+        messages = _messages(own, station, own_damage)
+        written.append((_parameters(said, station, autopilot), last_time_s(messages)))
         logs.append(
             AutopilotLog(
                 path=path,
@@ -124,22 +140,53 @@ def read_tlog(path: Path) -> list[AutopilotLog]:
                 autopilot=AUTOPILOTS.get(autopilot, "ardupilot"),
                 vehicle=BY_MAV_TYPE.get(kind, ""),
                 firmware=next((t for t in texts if "ardu" in t.lower() or "px4" in t.lower()), ""),
-                messages=_messages(own, own_damage, own_remarks),
-                parameters=dict(zip(words, map(float, values.get("param_value", ())), strict=True)),
+                messages=messages,
+                parameters={},
                 damage=tuple(own_damage),
                 lost=lost,
                 texts=tuple(texts),
                 remarks=tuple(own_remarks),
             )
         )
-    # The station asks for parameters once, whatever restarts behind its back.
-    said: dict[str, float] = {}
-    for log in reversed(logs):
-        said |= log.parameters
-    for k, log in enumerate(logs):
-        said = {**said, **log.parameters}
-        logs[k] = replace(log, parameters=said)
-    return logs
+    return _with_parameters(logs, written)
+
+
+def _with_parameters(
+    logs: Sequence[AutopilotLog], written: Sequence[tuple[list[tuple[str, float, float]], float]]
+) -> list[AutopilotLog]:
+    """Return logs with their parameters, of each flight as said in it, and when it ended.
+
+    A station asks for them once, whatever restarts behind its back: what a flight does not say is
+    as it was before it, or as it was said first.
+    """
+    known = {name: value for own, _ in reversed(written) for name, value, _ in reversed(own)}
+    found = []
+    for log, (own, end_s) in zip(logs, written, strict=True):
+        before = [(name, value, -np.inf) for name, value in known.items()]
+        found.append(replace(log, parameters=Parameters([*before, *own], end_s)))
+        known |= {name: value for name, value, _ in own}
+    return found
+
+
+def _first_place(timed: Sequence[tuple[IntArray, Array]], start: int) -> int:
+    """Return the place of the first message with a time of its own, from a start on."""
+    rows = [(places, int(np.searchsorted(places, start))) for places, _ in timed]
+    return min((int(places[row]) for places, row in rows if row < len(places)), default=start)
+
+
+def _parameters(said: Fields, station: _Station, autopilot: int) -> list[tuple[str, float, float]]:
+    """Return name, value and time of parameters as the autopilot said them.
+
+    PX4 sends the bytes of an integer as those of a float, ArduPilot its value.
+    """
+    if not said:
+        return []
+    values = said["param_value"].astype(np.float64)
+    if AUTOPILOTS.get(autopilot) == "px4":
+        whole = np.ascontiguousarray(said["param_value"]).view("<i4")
+        values = np.where(said["param_type"] == REAL32, values, whole)
+    t_s = station.since_boot_s(np.asarray(said[STAMP], dtype=np.float64), said[PLACE])
+    return list(zip(_words(said["param_id"]), values.tolist(), t_s.tolist(), strict=True))
 
 
 def _between(fields: Fields, first: int, end: int) -> Fields:
@@ -192,8 +239,10 @@ def _add(found: _Received, data: bytes, frames: Frames, known: Mapping[int, Layo
         numbers = frames.numbers[frames.senders == sender].astype(np.int64)
         before = found.last_number.get(sender, int(numbers[0]) - 1)
         missed = (np.diff(numbers, prepend=before) - 1) % 256
-        found.lost[sender] = found.lost.get(sender, 0) + int(missed.sum())
-        found.many[sender] = found.many.get(sender, 0) + len(numbers)
+        places = (np.flatnonzero(frames.senders == sender) + found.frames).astype(np.uint32)
+        found.many.setdefault(sender, []).append(places)
+        gaps = np.flatnonzero(missed)
+        found.gaps.setdefault(sender, []).append(np.stack([places[gaps], missed[gaps]]))
         found.last_number[sender] = int(numbers[-1])
     view = np.frombuffer(data, dtype=np.uint8)
     for number, layout in known.items():
@@ -239,17 +288,29 @@ def _heartbeat(received: _Received, sender: int) -> tuple[int, int] | None:
     return beats[len(beats) // 2] if beats else None
 
 
-def _damage(received: _Received, sender: int) -> list[str]:
+def _damage(received: _Received) -> list[str]:
     said = []
     if received.wrong_crc:
         said.append(f"{received.wrong_crc} frames have a wrong checksum and were left out")
     if received.strange_bytes:
         said.append(f"{received.strange_bytes} bytes belong to no frame")
-    lost, total = received.lost[sender], received.many[sender]
-    if lost:
-        share = 100.0 * lost / (lost + total)
-        said.append(f"{lost} frames ({share:.1f} %) of the vehicle never came: the radio lost them")
     return said
+
+
+def _lost(
+    received: _Received, sender: int, first: int, end: int, restarts: Sequence[tuple[int, int]]
+) -> list[str]:
+    """Return a line on frames of the vehicle that never came, between two places of the log."""
+    places, missed = np.concatenate(received.gaps[sender], axis=1)
+    counts = (places >= first) & (places < end)
+    for start, timed in restarts:
+        counts &= (places < start) | (places > timed)
+    lost = int(missed[counts].sum())
+    total = sum(int(np.sum((many >= first) & (many < end))) for many in received.many[sender])
+    if not lost:
+        return []
+    share = 100.0 * lost / (lost + total)
+    return [f"{lost} frames ({share:.1f} %) of the vehicle never came: the radio lost them"]
 
 
 def _words(raw: Any) -> list[str]:
@@ -257,9 +318,8 @@ def _words(raw: Any) -> list[str]:
 
 
 def _messages(
-    tables: dict[str, Fields], damage: list[str], remarks: list[str]
+    tables: dict[str, Fields], station: _Station, damage: list[str]
 ) -> dict[str, dict[int, Messages]]:
-    station = _Station(tables, remarks)
     found: dict[str, dict[int, Messages]] = {}
     for name in list(tables):
         fields = dict(tables.pop(name))

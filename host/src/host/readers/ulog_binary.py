@@ -72,8 +72,9 @@ class ULogContent:
     Attributes
     ----------
     topics : list of Topic
-    parameters : dict of str to float
-        As they were when logging began.
+    written : list of (str, float, float)
+        Parameters as they were written: name, value, and the time, us, of the message before it; 0
+        before logging began.
     said : dict of str to str
         Of the information messages those in `SAID`.
     dropouts, dropped_ms : int
@@ -84,10 +85,12 @@ class ULogContent:
         Bytes of a last message that is cut.
     refused : dict of str to str
         Why something of the log is not read.
+    twice : list of str
+        Topics that are defined again, and otherwise: the first definition counts.
     """
 
     topics: list[Topic] = field(default_factory=list)
-    parameters: dict[str, float] = field(default_factory=dict)
+    written: list[tuple[str, float, float]] = field(default_factory=list)
     said: dict[str, str] = field(default_factory=dict)
     dropouts: int = 0
     dropped_ms: int = 0
@@ -95,6 +98,7 @@ class ULogContent:
     strange_at: int = 0
     rest: int = 0
     refused: dict[str, str] = field(default_factory=dict)
+    twice: list[str] = field(default_factory=list)
 
 
 def read_content(
@@ -121,6 +125,7 @@ def read_content(
             reading.section(file, first, end, progress)
     if reading.formats.left_out:
         reading.found.refused["formats"] = f"{reading.formats.left_out} definitions are too many"
+    reading.found.twice = reading.formats.twice
     return reading.found
 
 
@@ -154,7 +159,7 @@ class _Reading:
         self._columns: dict[str, tuple[np.dtype[np.void], NDArray[np.intp]] | None] = {}
         self._known: dict[tuple[str, int], int] = {}
         self._subscribed = 0
-        self._logging = False
+        self._now_us = 0.0  # of the last message that is read
 
     def section(self, file: BinaryIO, first: int, end: int, progress: Any) -> None:
         """Read the messages between two places."""
@@ -275,6 +280,7 @@ class _Reading:
         rows = starts[kinds == ord("D")]
         which = self._topic[view[rows + 3].astype(np.int64) | view[rows + 4].astype(np.int64) << 8]
         rows, which = rows[which >= 0], which[which >= 0]
+        timed = rows, which
         order = np.argsort(which, kind="stable")
         turns = np.flatnonzero(np.diff(which[order])) + 1
         for group in np.split(order, turns) if len(order) else ():
@@ -284,20 +290,30 @@ class _Reading:
         for at in starts[np.isin(kinds, np.frombuffer(b"FIPALO", "u1"))].tolist():
             length = data[at] | data[at + 1] << 8
             body_at = at + _MESSAGE_HEAD
+            if data[at + 2] == ord("P"):
+                self._pass(view, *timed, at)
             self._other(data[at + 2], data[body_at : body_at + length])
+        self._pass(view, *timed, len(data))
+
+    def _pass(
+        self, view: NDArray[np.uint8], rows: NDArray[np.int64], which: NDArray[np.int16], at: int
+    ) -> None:
+        """Note the time of the last message that is read before a place."""
+        before = int(np.searchsorted(rows, at)) - 1
+        topic = self.found.topics[which[before]] if before >= 0 else None
+        if topic is not None and "timestamp" in topic.columns:
+            body = view[rows[before] + (_MESSAGE_HEAD + 2) + topic.span]
+            self._now_us = float(body.view(topic.packed)["timestamp"][0])
 
     def _other(self, kind: int, body: bytes) -> None:
         if kind == ord("F"):
             self.formats.define(body.decode("ascii", "replace"))
         elif kind == _SUBSCRIPTION:
-            self._logging = True
             self._subscribe(body[0], body[1] | body[2] << 8, body[3:])
-        elif kind == ord("L"):
-            self._logging = True
         elif kind == ord("O"):
             self.found.dropouts += 1
             self.found.dropped_ms += body[0] | body[1] << 8
-        elif kind == ord("P") and not self._logging:
+        elif kind == ord("P"):
             self._parameter(body[1 : 1 + body[0]], body[1 + body[0] :])
         elif kind == ord("I"):
             typed, _, key = body[1 : 1 + body[0]].decode("ascii", "replace").rpartition(" ")
@@ -309,9 +325,10 @@ class _Reading:
         kind, _, name = key.partition(b" ")
         if kind not in _NUMBERS or len(value) != 4 or len(name) > 32 or not name.isascii():
             return
-        parameters = self.found.parameters
-        if len(parameters) < MOST_PARAMETERS:
-            parameters[name.decode("ascii")] = float(struct.unpack(_NUMBERS[kind], value)[0])
+        written = self.found.written
+        if len(written) < MOST_PARAMETERS:
+            number = float(struct.unpack(_NUMBERS[kind], value)[0])
+            written.append((name.decode("ascii"), number, self._now_us))
         else:
             self.found.refused["parameters"] = f"only the first {MOST_PARAMETERS} parameters"
 

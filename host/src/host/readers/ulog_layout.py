@@ -46,6 +46,7 @@ class Formats:
 
     def __init__(self) -> None:
         self.left_out = 0  # definitions beyond the bounds
+        self.twice: list[str] = []  # defined again, and otherwise
         self._texts: dict[str, str] = {}
         self._text_bytes = 0
         self._fields: dict[str, tuple[Field, ...]] = {}
@@ -55,7 +56,11 @@ class Formats:
     def define(self, text: str) -> None:
         """Take ``name:kind field;kind field;``; of two of a name the first counts."""
         name, colon, fields = text.partition(":")
-        if not colon or not _NAME.fullmatch(name) or name in self._texts:
+        if not colon or not _NAME.fullmatch(name):
+            return
+        if name in self._texts:
+            if self._texts[name] != fields and name not in self.twice:
+                self.twice.append(name)
             return
         if len(self._texts) == MOST_FORMATS or self._text_bytes + len(fields) > MOST_TEXT_BYTES:
             self.left_out += 1

@@ -8,10 +8,16 @@ from typing import Any
 import numpy as np
 
 from host.arrays import Array
-from host.readers.autopilot_log import AutopilotLog, Messages, NotAutopilotLogError
+from host.readers.autopilot_log import (
+    AutopilotLog,
+    Messages,
+    NotAutopilotLogError,
+    last_time_s,
+)
 from host.readers.clock_epochs import clock_origin_s
 from host.readers.plausible_times import plausible_times
 from host.readers.ulog_binary import SAID, Topic, ULogContent, UnknownFlagsError, read_content
+from host.readers.written_parameters import Parameters
 
 WANTED = (
     "sensor_combined", "vehicle_angular_velocity", "vehicle_acceleration", "vehicle_attitude",
@@ -53,21 +59,31 @@ def read_ulog(path: Path) -> AutopilotLog:
             " damaged, or of a newer PX4?"
         ) from None
     damage, lost = _damage(log)
-    messages = _messages(log, damage)
-    if not messages and not log.parameters:
+    origin_s = clock_origin_s(
+        topic.first("timestamp") * 1e-6 for topic in log.topics if _is_timed(topic)
+    )
+    messages = _messages(log, origin_s, damage)
+    if not messages and not log.written:
         raise NotAutopilotLogError(
             f"{path}: begins as a ULog but holds no message that is known; is it cut?"
         )
+    end_s = last_time_s(messages)
+    parameters = Parameters(
+        [(name, value, at_us * 1e-6 - origin_s) for name, value, at_us in log.written], end_s
+    )
     return AutopilotLog(
         path=path,
         format="ulog",
         autopilot="px4",
-        vehicle=_vehicle(messages, log.parameters),
+        vehicle=_vehicle(messages, parameters),
         firmware=" ".join(log.said[k] for k in SAID if k in log.said),
         messages=messages,
-        parameters=log.parameters,
+        parameters=parameters,
         damage=tuple(damage),
         lost=lost,
+        remarks=tuple(
+            f"{name} is defined twice: the first definition counts" for name in log.twice[:5]
+        ),
     )
 
 
@@ -91,15 +107,15 @@ def _damage(log: ULogContent) -> tuple[list[str], int]:
     return said, lost
 
 
-def _messages(log: ULogContent, damage: list[str]) -> dict[str, dict[int, Messages]]:
+def _messages(
+    log: ULogContent, origin_s: float, damage: list[str]
+) -> dict[str, dict[int, Messages]]:
     """Return the messages of each topic; what was read of it is given up, small ones first.
 
     A gigabyte is in memory once, and of a topic only what is read is there twice.
     """
     found: dict[str, dict[int, Messages]] = {}
     log.topics.sort(key=lambda topic: len(topic.data), reverse=True)
-    origin_s = clock_origin_s(topic.first("timestamp") * 1e-6 for topic in log.topics
-                              if _is_timed(topic))  # fmt: skip
     while log.topics:
         topic = log.topics.pop()
         messages = _topic(topic, origin_s, damage)
