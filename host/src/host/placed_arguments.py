@@ -93,6 +93,20 @@ class StorePlaced(argparse.Action):
         setattr(namespace, self.dest, [*(getattr(namespace, self.dest) or ()), placed])
 
 
+def flattened(flights: Iterable[Sequence[Path]]) -> list[Path]:
+    """Return the flights of all files, in order."""
+    return [flight for every in flights for flight in every]
+
+
+def of_each_flight(
+    value: T | list[T | None] | None, flights: Sequence[Sequence[Path]]
+) -> T | list[T | None] | None:
+    """Return the value of an option for all flights, or for each: that of its file."""
+    if not isinstance(value, list):
+        return value
+    return [own for own, every in zip(value, flights, strict=True) for _ in every]
+
+
 def of_each(option: str, placed: Placed[T], files: int) -> T | list[T | None] | None:
     """Return the value of an option for all files, or for each.
 

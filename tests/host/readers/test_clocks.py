@@ -6,13 +6,15 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from host.cli import main
 from host.errors import IdentificationError
+from host.placed_arguments import of_each_flight
 from host.readers.autopilot_flight import AutopilotFlight, read_autopilot
 from host.readers.autopilot_log import FlightChoiceError
 from host.readers.clock_epochs import clock_sets, epoch_starts
-from host.sysid.flight import FlightColumns, read_flight_columns
+from host.sysid.flight import FlightColumns, chosen_flights, read_flight_columns
 
 from tests.host.readers import changed_logs as logs
 
@@ -179,6 +181,34 @@ def test_recordings_behind_each_other_in_a_table(tmp_path: Path) -> None:
     assert len(first.columns["t_s"]) == 999
     with pytest.raises(IdentificationError, match="no flight 3"):
         read_flight_columns(tmp_path / "two.csv#3")
+    source = tmp_path / "two.csv"
+    every_flight = chosen_flights([source, tmp_path / "same.csv"], "all")
+    assert every_flight == [[Path(f"{source}#1"), Path(f"{source}#2")], [tmp_path / "same.csv"]]
+    assert of_each_flight(["a", "b"], every_flight) == ["a", "a", "b"]
+
+
+def test_all_flights_of_a_log_of_ours_are_its_sessions_with_rows() -> None:
+    log = Path(__file__).parents[2] / "data" / "format-1-sitl-causes.bin"
+    (every,) = chosen_flights([log], "all")
+    assert every == [Path(f"{log}#2"), Path(f"{log}#3")]
+    rows = [len(read_flight_columns(one).columns["t_s"]) for one in every]
+    assert rows == pytest.approx([95, 359], abs=2)
+
+
+@pytest.mark.parametrize("dated", [True, False])
+def test_midnight_in_text(dated: bool, tmp_path: Path) -> None:
+    """Of a time of the day, and of one with its date."""
+    rows = logs.table()
+    control = read_table(tmp_path / "same.csv", logs.lines(rows))
+    start = pd.Timestamp("2026-03-01 23:59:50.5")
+    instants = start + pd.to_timedelta(rows["t_s"], unit="s")
+    form = "%Y-%m-%d %H:%M:%S.%f" if dated else "%H:%M:%S.%f"
+    written = rows.assign(t_s=instants.dt.strftime(form))
+    found = read_table(tmp_path / "midnight.csv", logs.lines(written))
+    assert any("after a day" in note for note in found.notes) != dated
+    t, true = found.columns["t_s"], control.columns["t_s"]
+    np.testing.assert_allclose(t - t[0], true - true[0], atol=1e-5)
+    np.testing.assert_allclose(found.columns["q_radps"], control.columns["q_radps"], atol=1e-2)
 
 
 def read_table(path: Path, every: list[str]) -> FlightColumns:

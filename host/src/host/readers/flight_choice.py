@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from host.errors import UsageError
-
 ALL = "all"
 MARK = "#"
 
@@ -21,37 +19,6 @@ def file_and_flight(source: Path) -> tuple[Path, int | None]:
     return source, None
 
 
-def with_flight(sources: list[Path], flight: int | str | None) -> list[Path]:
-    """Return the sources that a choice of ``--flight`` makes of files: with ``all`` each flight.
-
-    Raises
-    ------
-    host.errors.HostError
-        If a file cannot be read.
-    """
-    if flight is None:
-        return sources
-    if flight != ALL:
-        return [Path(f"{source}{MARK}{flight}") for source in sources]
-    return [
-        Path(f"{source}{MARK}{number}") for source in sources for number in flight_numbers(source)
-    ]
-
-
-def flight_numbers(source: Path) -> list[int]:
-    """Return the numbers of the flights of a log in which something flew.
-
-    Raises
-    ------
-    UsageError
-        If none did, or flights are of no concern to such a file.
-    """
-    from host.readers.autopilot_flight import is_autopilot_log, read_autopilot
-
-    if not is_autopilot_log(source):
-        raise UsageError(
-            f"{source}: --flight all is for logs of PX4 and ArduPilot; name its number"
-        )
-    found = read_autopilot(source)
-    flown = [one.number for one in found.listed if one.airborne_s > 0.0]
-    return flown or [found.number]
+def with_flight(source: Path, flight: int | None) -> Path:
+    """Return the source that a flight of a file is; without a number the file itself."""
+    return source if flight is None else Path(f"{source}{MARK}{flight}")

@@ -74,6 +74,14 @@ def evenly_timed(columns: Mapping[str, Array]) -> tuple[Array, float] | None:
     return (line, digit_s) if np.max(np.abs(t - line)) < EVEN * digit_s else None
 
 
+def recordings(t_s: Array) -> list[IntArray]:
+    """Return the rows of each recording of a table, by its times (n,), which go on within one."""
+    seen = np.flatnonzero(np.isfinite(t_s))
+    places: IntArray = np.arange(len(seen))
+    ends = [0, *epoch_starts([(places, t_s[seen])]), len(seen)]
+    return [seen[a:b] for a, b in pairwise(ends)]
+
+
 def one_recording(
     columns: Mapping[str, Array], flight: int | None, source: str, notes: list[str]
 ) -> dict[str, Array]:
@@ -85,15 +93,12 @@ def one_recording(
         If there is none of that number.
     """
     t = columns["t_s"]
-    seen = np.flatnonzero(np.isfinite(t))
-    places: IntArray = np.arange(len(seen))
-    ends = [0, *epoch_starts([(places, t[seen])]), len(seen)]
-    parts = [seen[a:b] for a, b in pairwise(ends)]
+    parts = recordings(t)
     if flight is not None and not 1 <= flight <= len(parts):
         raise IdentificationError(f"{source}: no flight {flight}; it has 1 to {len(parts)}")
     if len(parts) == 1:
         return dict(columns)
-    lengths = [_flown_s(columns, rows) for rows in parts]
+    lengths = [flown_s(columns, rows) for rows in parts]
     chosen = int(np.argmax(lengths)) if flight is None else flight - 1
     listed = ", ".join(
         f"{k}: rows {rows[0] + 1} to {rows[-1] + 1}, {np.ptp(t[rows]):.0f} s"
@@ -107,7 +112,7 @@ def one_recording(
     return {name: values[rows] for name, values in columns.items()}
 
 
-def _flown_s(columns: Mapping[str, Array], rows: IntArray) -> float:
+def flown_s(columns: Mapping[str, Array], rows: IntArray) -> float:
     """Return how long a recording flew; how long it is, if it does not say."""
     length_s = float(np.ptp(columns["t_s"][rows]))
     speed = columns.get("airspeed_mps")

@@ -219,7 +219,7 @@ def _found_in(path: Path, wanted: FlightRequest) -> tuple[Maneuvers, list[str]]:
     """Return the test points of a source whose sensors are slow, and drop out: what stands still
     counts as missing there, as in `host maneuvers`."""
     try:
-        (source,) = with_flight([path], wanted.session)
+        source = with_flight(path, wanted.session)
         found, _ = read_columns(
             source,
             calibration=wanted.calibration,

@@ -10,7 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from host.decode.newest_flight import source_or_newest
-from host.placed_arguments import StorePlaced, of_each, stretches_of_each
+from host.placed_arguments import (
+    StorePlaced,
+    flattened,
+    of_each,
+    of_each_flight,
+    stretches_of_each,
+)
 from host.source_arguments import add_data_choices, add_flight
 
 if TYPE_CHECKING:
@@ -121,9 +127,9 @@ def _run(args: argparse.Namespace) -> int:
     from host.aircraft.origin import announce_aircraft
     from host.errors import ExitCode
     from host.readers.autopilot_flight import chosen_sensors
-    from host.readers.flight_choice import with_flight
     from host.sysid.answer import check_outputs
     from host.sysid.estimators import read_options
+    from host.sysid.flight import chosen_flights
     from host.sysid.pipeline import identify
     from host.sysid.pipeline.arguments import option_words
     from host.sysid.pipeline.requested_models import requested_methods
@@ -132,7 +138,10 @@ def _run(args: argparse.Namespace) -> int:
         print("\n".join(lines))
         return int(ExitCode.OK)
     args.source = args.source or [source_or_newest(None)]
-    args.source = with_flight(args.source, args.flight)
+    files = len(args.source)
+    mapping = of_each("--map", args.map, files)
+    flights = chosen_flights(args.source, args.flight, mapping)
+    args.source = flattened(flights)
     places = _places(args)
     check_outputs(places, requested_methods(args.method))
     found = identify(
@@ -140,10 +149,10 @@ def _run(args: argparse.Namespace) -> int:
         aircraft=args.aircraft,
         models=args.model,
         methods=args.method,
-        calibration=of_each("--calibration", args.calibration, len(args.source)),
-        mapping=of_each("--map", args.map, len(args.source)),
+        calibration=of_each_flight(of_each("--calibration", args.calibration, files), flights),
+        mapping=of_each_flight(mapping, flights),
         maneuvers=args.maneuver or (),
-        stretches=stretches_of_each(args.ends, len(args.source)),
+        stretches=of_each_flight(stretches_of_each(args.ends, files), flights),
         corrections=not args.no_corrections,
         accept=args.accept or (),
         sensors=chosen_sensors(args.sensor),

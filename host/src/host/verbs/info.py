@@ -72,7 +72,7 @@ def _maneuvers(source: Path, number: int) -> int | None:
     from host.sysid.maneuvers import detect_maneuvers
 
     try:
-        columns, _ = read_columns(*with_flight([source], number))
+        columns, _ = read_columns(with_flight(source, number))
     except HostError:
         return None
     return len(detect_maneuvers(columns))

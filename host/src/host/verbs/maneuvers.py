@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
         print("\n".join(map_lines()))
         return int(ExitCode.OK)
     try:
-        (source,) = with_flight([source_or_newest(args.source)], args.flight)
+        source = with_flight(source_or_newest(args.source), args.flight)
         columns, notes = read_columns(source, args.map, calibration=args.calibration,
                                       sensors=chosen_sensors(args.sensor),
                                       row_rate_hz=args.row_rate)  # fmt: skip

@@ -9,7 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from host.decode.newest_flight import source_or_newest
-from host.placed_arguments import StorePlaced, of_each, stretches_of_each
+from host.placed_arguments import (
+    StorePlaced,
+    flattened,
+    of_each,
+    of_each_flight,
+    stretches_of_each,
+)
 from host.source_arguments import add_data_choices, add_flight
 
 
@@ -51,10 +57,10 @@ def run(args: argparse.Namespace) -> int:
     from host.aircraft.origin import announce_aircraft
     from host.errors import ExitCode, IdentificationError, UsageError
     from host.readers.autopilot_flight import chosen_sensors
-    from host.readers.flight_choice import with_flight
     from host.readers.shipped_maps import LIST, map_lines
     from host.sysid.answer import OutputPaths, check_outputs
     from host.sysid.checks.data_finding import check_lines
+    from host.sysid.flight import chosen_flights
     from host.sysid.models.named_models import shipped_lines
     from host.sysid.pipeline import predict
     from host.sysid.pipeline.arguments import option_words
@@ -72,16 +78,21 @@ def run(args: argparse.Namespace) -> int:
         if not args.source:
             raise IdentificationError("name a saved model, and behind it the records it predicts")
         model, *records = args.source
-        records = with_flight(records or [source_or_newest(None)], args.flight)
+        records = records or [source_or_newest(None)]
+        files = len(records)
+        mapping = of_each("--map", _behind(args.map), files)
+        flights = chosen_flights(records, args.flight, mapping)
+        calibration = of_each("--calibration", _behind(args.calibration), files)
+        stretches = stretches_of_each(_behind(args.ends), files)
         check_outputs(OutputPaths(plots=args.plots))
         found = predict(
             model,
-            records,
+            flattened(flights),
             aircraft=args.aircraft,
-            calibration=of_each("--calibration", _behind(args.calibration), len(records)),
-            mapping=of_each("--map", _behind(args.map), len(records)),
+            calibration=of_each_flight(calibration, flights),
+            mapping=of_each_flight(mapping, flights),
             maneuvers=args.maneuver or (),
-            stretches=stretches_of_each(_behind(args.ends), len(records)),
+            stretches=of_each_flight(stretches, flights),
             corrections=not args.no_corrections,
             accept=args.accept or (),
             sensors=chosen_sensors(args.sensor),

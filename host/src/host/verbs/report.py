@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from host.decode.newest_flight import source_or_newest
-from host.placed_arguments import StorePlaced, of_each
+from host.placed_arguments import StorePlaced, flattened, of_each, of_each_flight
 from host.source_arguments import add_flight, add_row_rate, add_sensor
 
 _DESCRIPTION = """\
@@ -110,14 +110,19 @@ def run(args: argparse.Namespace) -> int:
     from host.aircraft.origin import announce_aircraft
     from host.errors import ExitCode, UsageError
     from host.readers.autopilot_flight import chosen_sensors
-    from host.readers.flight_choice import with_flight
     from host.report.reporting import ReportRequest, write_report
+    from host.sysid.flight import chosen_flights
     from host.sysid.pipeline.arguments import option_words
     from host.terminal import command_line
     from host.text import shown
 
-    sources = with_flight(args.source or [source_or_newest(None)], args.flight)
-    calibration = of_each("--calibration", args.calibration, len(sources))
+    given_sources = args.source or [source_or_newest(None)]
+    mapping = of_each("--map", args.map, len(given_sources))
+    flights = chosen_flights(given_sources, args.flight, mapping)
+    sources = flattened(flights)
+    calibration = of_each_flight(
+        of_each("--calibration", args.calibration, len(given_sources)), flights
+    )
     given = [args.prior, *(path for _, path in (*args.map, *args.truth))]
     files = [path for path in given if path is not None]
     if args.aircraft and Path(args.aircraft).is_file():
@@ -130,7 +135,7 @@ def run(args: argparse.Namespace) -> int:
             "calibration": calibration,
             "models": args.model,
             "methods": args.method,
-            "mapping": of_each("--map", args.map, len(sources)),
+            "mapping": of_each_flight(mapping, flights),
             "truth": [path for _, path in args.truth],
             "prior": args.prior,
             "row_rate_hz": args.row_rate,

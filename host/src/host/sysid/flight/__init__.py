@@ -9,6 +9,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from host.sysid.flight.column_change import ColumnChange, changed_columns
     from host.sysid.flight.filter_step import with_filter_step
+    from host.sysid.flight.flight_selection import chosen_flights
     from host.sysid.flight.flight_tables import FlightColumns, read_columns, read_flight_columns
     from host.sysid.flight.reconstructed_flight import (
         FlownManeuver,
@@ -23,6 +24,7 @@ __all__ = [
     "FlownManeuver",
     "ReconstructedFlight",
     "changed_columns",
+    "chosen_flights",
     "maneuver_name",
     "read_columns",
     "read_flight_columns",
@@ -38,6 +40,7 @@ __getattr__ = lazily(
         "FlownManeuver": "reconstructed_flight",
         "ReconstructedFlight": "reconstructed_flight",
         "changed_columns": "column_change",
+        "chosen_flights": "flight_selection",
         "maneuver_name": "reconstructed_flight",
         "read_columns": "flight_tables",
         "read_flight_columns": "flight_tables",
