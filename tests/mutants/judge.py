@@ -2,11 +2,12 @@
 
 universalmutator alters the source line by line. A mutant counts when it compiles and its object
 differs from the original's and from every other mutant's (-O2, no debug information): what the
-compiler finds the same cannot be told apart by any test. A header's object is that of the suites
-that include it. A mutant is killed when a test case fails, the suite crashes or runs for twenty
-times its processor time, a second at least. What survives so is built once more under address and
-undefined-behaviour sanitizers, as `pio test -e native` does, and compared with the original's
-object at other levels of optimisation: where one is equal, the program is the same.
+compiler finds the same cannot be told apart by any test. A header's object is that of its suites'
+files that include it, at -O0, for optimising them takes four times as long; only what lives is
+compared at -O2 too. A mutant is killed when a test case fails, the suite crashes or runs for twenty
+times its processor time, 0.3 s at least. What survives so is compared with the original's
+object at other levels of optimisation: where one is equal, the program is the same. The rest is
+built once more under address and undefined-behaviour sanitizers, as `pio test -e native` does.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import json
 import os
 import re
 import resource
+import signal
 import subprocess
 import sys
 import tempfile
@@ -24,6 +26,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
+from threading import Lock
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
@@ -46,8 +49,8 @@ SANITIZED = (
     *("-fsanitize=address,undefined", "-fno-sanitize-recover=all"),
 )
 MAIN = ("-std=gnu++14", "-O0", "-g0", "-w", "-Itests/firmware")  # doctest's own code: 2 s, not 16
-OTHER_LEVELS = ("-O1", "-Os", "-O3")
-LEAST_CPU_S, MOST_TIMES = 1, 20  # one mutant in six never ends
+OTHER_LEVELS = ("-Os", "-O1", "-O3")  # a header is compared at the first alone
+LEAST_CPU_S, MOST_TIMES = 0.3, 20  # one mutant in six never ends
 LIBRARY = "libmutant.so"
 # What the rules make of names of types (uint0_t, uint(8+1)_t): never compiles.
 _BROKEN_TYPE = re.compile(r"\bu?int(-?[01]|\(\d+[+-]1\))_t|\bu?int\d+_t\(")
@@ -120,6 +123,8 @@ class Judge:
         Its suites in tests/firmware.
     folder : Path
         For objects and programs.
+    shared : Path, optional
+        For objects that other files' suites link too.
 
     Raises
     ------
@@ -127,75 +132,118 @@ class Judge:
         If the unchanged file does not pass.
     """
 
-    def __init__(self, name: str, suites: tuple[str, ...], folder: Path) -> None:
+    def __init__(
+        self, name: str, suites: tuple[str, ...], folder: Path, shared: Path | None = None
+    ) -> None:
         self.source = FIRMWARE / name
         self._name, self._suites, self._folder = name, suites, folder
+        self._shared = shared or folder / "shared"
+        self._of_suites = [p for s in suites for p in sorted((SUITES / s).glob("*.cpp"))]
         self._programs: dict[tuple[str, ...], list[Path]] = {}
-        self._limits_s: dict[tuple[str, ...], int] = {}
+        self._limits_s: dict[tuple[str, ...], float] = {}
+        # What tells mutants apart first, and what judges them.
+        self._plain = _plain_at("-O0") if self._is_header else PLAIN
+        self._including = self._files_that_include() if self._is_header else []
+        self._headers = _headers()
+        self._sanitizing = Lock()
+        self._originals: dict[tuple[str, ...], str] = {}
+        self._prepare(self._plain)
+
+    def _prepare(self, flags: tuple[str, ...]) -> None:
+        """Build the suites of the unchanged file and see that they pass."""
+        kind = "sanitized" if flags is SANITIZED else "plain"
         text = self.source.read_text(encoding="utf-8")
-        for flags in (PLAIN, SANITIZED):
-            kind = "plain" if flags is PLAIN else "sanitized"
-            others = [p for p in sorted((FIRMWARE / "core").rglob("*.cpp")) if p != self.source]
-            objects = [self._object(path, flags, kind) for path in others]
-            objects.append(self._object(SUITES / "check_main.cpp", MAIN, "main"))
-            if self._is_header:
-                self._compile_ahead(flags)
-            original = folder / kind
-            original.mkdir()
-            built = self._built(text, original, flags)
-            if not built or not self._link(built, original, flags):
-                raise MutantError(f"{name} does not link")
-            if self._is_header:
-                self._programs[flags] = [self._program("all", objects, original, flags, kind)]
-            else:
-                self._programs[flags] = [
-                    self._program(suite, [*self._cases(suite, flags, kind), *objects],
-                                  original, flags, kind)
-                    for suite in suites
-                ]  # fmt: skip
-            self._limits_s[flags] = 60
-            before_s = _children_s()
-            if not self._passes(original, flags):
-                raise MutantError(f"{name}: its own suite fails without a mutation")
-            took_s = _children_s() - before_s
-            self._limits_s[flags] = max(LEAST_CPU_S, round(MOST_TIMES * took_s))
-        self.original = self._content_of(text, folder / "plain", PLAIN)
-        self._originals: dict[str, str] = {}
+        shared = SANITIZED if flags is SANITIZED else PLAIN
+        objects = [self._object(path, shared) for path in self._others()]
+        objects.append(self._object(SUITES / "check_main.cpp", MAIN))
+        if self._is_header:
+            self._compile_ahead(flags)
+        original = self._folder / kind
+        original.mkdir()
+        built = self._built(text, original, flags)
+        if not built or not self._link(built, original, flags):
+            raise MutantError(f"{self._name} does not link")
+        if self._is_header:
+            programs = [self._program("all", objects, original, flags, kind)]
+        else:
+            programs = [
+                self._program(suite, [*self._cases(suite, flags), *objects], original, flags, kind)
+                for suite in self._suites
+            ]
+        self._programs[flags] = programs
+        self._limits_s[flags] = 60.0
+        before_s = _children_s()
+        if not self._passes(original, flags):
+            raise MutantError(f"{self._name}: its own suite fails without a mutation")
+        self._limits_s[flags] = max(LEAST_CPU_S, MOST_TIMES * (_children_s() - before_s))
 
     @property
     def _is_header(self) -> bool:
         return self.source.suffix == ".h"
 
+    def _files_that_include(self) -> list[Path]:
+        """Return the files of the suites that a change of the header reaches."""
+        found = [path for path in self._of_suites if self.source in includes(path)]
+        if not found:
+            raise MutantError(f"{self._name}: none of {', '.join(self._suites)} includes it")
+        return found
+
+    def _others(self) -> list[Path]:
+        """Return what the suites link beside the mutant, in an order of its own."""
+        core = FIRMWARE / "core"
+        others = set(core.rglob("*.cpp"))
+        for path in self._of_suites:
+            # A suite of the IMU's program needs all of its room.
+            used = (one for one in includes(path) if FIRMWARE in one.parents)
+            rooms = {one.parent for one in used if one.with_suffix(".cpp").is_file()}
+            others.update(one for room in rooms for one in room.glob("*.cpp"))
+            if self._is_header and path not in self._including:
+                others.add(path)
+        return sorted(others - {self.source})
+
     def verdict(self, mutant: Mutant, seen: dict[str, str]) -> str:
         """Judge a mutant; `seen` holds the objects known so far, by their content."""
         with tempfile.TemporaryDirectory(dir=self._folder) as name:
             folder = Path(name)
-            built = self._built(mutant.text, folder, PLAIN)
+            built = self._built(mutant.text, folder, self._plain)
             if not built:
                 return INVALID
             content = self._content(built)
-            if content == self.original or seen.setdefault(content, mutant.key) != mutant.key:
+            if content == self._original(self._plain) or _is_known(seen, content, mutant):
                 return SAME
-            if not self._link(built, folder, PLAIN) or not self._passes(folder, PLAIN):
+            if not self._link(built, folder, self._plain) or not self._passes(folder, self._plain):
                 return KILLED
+            if self._is_same_otherwise(mutant, folder, seen):
+                return SAME
+            with self._sanitizing:
+                if SANITIZED not in self._programs:
+                    self._prepare(SANITIZED)
             built = self._built(mutant.text, folder, SANITIZED)
             if not built:
                 return INVALID
             if not (self._link(built, folder, SANITIZED) and self._passes(folder, SANITIZED)):
                 return KILLED
-            return SAME if self._is_same_otherwise(mutant, folder) else SURVIVED
+            return SURVIVED
 
-    def _is_same_otherwise(self, mutant: Mutant, folder: Path) -> bool:
+    def _is_same_otherwise(self, mutant: Mutant, folder: Path, seen: dict[str, str]) -> bool:
         if _SWAPPED.search(mutant.now) and _SWAPPED.sub(r"\1(\3, \2)", mutant.now) == mutant.was:
             return True
-        for level in OTHER_LEVELS:
-            flags = tuple(level if flag == "-O2" else flag for flag in PLAIN)
-            if level not in self._originals:
-                text = self.source.read_text(encoding="utf-8")
-                self._originals[level] = self._content_of(text, folder, flags)
-            if self._content_of(mutant.text, folder, flags) == self._originals[level]:
+        if self._is_header:
+            content = self._content_of(mutant.text, folder, PLAIN)
+            if content == self._original(PLAIN) or _is_known(seen, content, mutant):
+                return True
+        for level in OTHER_LEVELS[:1] if self._is_header else OTHER_LEVELS:
+            flags = _plain_at(level)
+            if self._content_of(mutant.text, folder, flags) == self._original(flags):
                 return True
         return False
+
+    def _original(self, flags: tuple[str, ...]) -> str:
+        if flags not in self._originals:
+            with tempfile.TemporaryDirectory(dir=self._folder) as name:
+                text = self.source.read_text(encoding="utf-8")
+                self._originals[flags] = self._content_of(text, Path(name), flags)
+        return self._originals[flags]
 
     def _content_of(self, text: str, folder: Path, flags: tuple[str, ...]) -> str:
         return self._content(self._built(text, folder, flags))
@@ -211,36 +259,40 @@ class Judge:
             return [target] if self._compile(place, target, flags) else []
         kind = "sanitized" if flags is SANITIZED else "plain"
         ahead = (f"-I{folder / 'changed'}", *flags)
-        if flags in (PLAIN, SANITIZED):
+        if flags in (self._plain, SANITIZED):
             ahead = (f"-I{self._folder / f'ahead-{kind}'}", "-include", "check.h", *ahead)
         built = []
-        for suite in self._suites:
-            for path in sorted((SUITES / suite).glob("*.cpp")):
-                target = folder / f"{suite}-{path.stem}.o"
-                if not self._compile(path, target, ahead):
-                    return []
-                built.append(target)
+        for path in self._including:
+            target = folder / f"{path.parent.name}-{path.stem}.o"
+            if not self._compile(path, target, ahead):
+                return []
+            built.append(target)
         return built
 
     def _compile_ahead(self, flags: tuple[str, ...]) -> None:
         """Compile doctest's header once: it is most of what a suite takes."""
-        ahead = self._folder / f"ahead-{'plain' if flags is PLAIN else 'sanitized'}"
+        ahead = self._folder / f"ahead-{'sanitized' if flags is SANITIZED else 'plain'}"
         ahead.mkdir()
         header = ahead / "check.h"
         header.write_bytes((SUITES / "check.h").read_bytes())
         command = [COMPILER, *flags, "-x", "c++-header", str(header), "-o", f"{header}.gch"]
         subprocess.run(command, cwd=ROOT, capture_output=True, check=True)
 
-    def _cases(self, suite: str, flags: tuple[str, ...], kind: str) -> list[Path]:
-        return [
-            self._object(p, flags, f"{kind}-{suite}")
-            for p in sorted((SUITES / suite).glob("*.cpp"))
-        ]
+    def _cases(self, suite: str, flags: tuple[str, ...]) -> list[Path]:
+        return [self._object(path, flags) for path in sorted((SUITES / suite).glob("*.cpp"))]
 
-    def _object(self, path: Path, flags: tuple[str, ...], kind: str) -> Path:
-        target = self._folder / f"{kind}-{path.parent.name}-{path.stem}.o"
-        if not target.is_file() and not self._compile(path, target, flags):
-            raise MutantError(f"{path} does not compile")
+    def _object(self, path: Path, flags: tuple[str, ...]) -> Path:
+        """Compile what no mutant alters, once for all files of the table."""
+        state = sha256("\0".join((COMPILER, path.parent.name, path.name, *flags)).encode())
+        beside = b"".join(other.read_bytes() for other in sorted(path.parent.glob("*.h")))
+        state.update(path.read_bytes() + self._headers + beside)
+        target = self._shared / f"{state.hexdigest()[:20]}.o"
+        if not target.is_file():
+            target.parent.mkdir(parents=True, exist_ok=True)
+            part = target.with_suffix(f".{os.getpid()}")
+            if not self._compile(path, part, flags):
+                raise MutantError(f"{path} does not compile")
+            part.replace(target)
         return target
 
     @staticmethod
@@ -298,9 +350,33 @@ def _children_s() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def _limit(most_s: int) -> None:
-    resource.setrlimit(resource.RLIMIT_CPU, (most_s, most_s))
+def _limit(most_s: float) -> None:
+    # It outlasts exec, and unlike RLIMIT_CPU it knows parts of a second.
+    signal.setitimer(signal.ITIMER_PROF, most_s)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def includes(path: Path) -> set[Path]:
+    """Return what of the firmware a file includes, by whatever way."""
+    command = [COMPILER, *PLAIN, "-MM", str(path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    words = (ROOT / word for word in done.stdout.split()[1:])
+    return {word.resolve() for word in words if word.is_file()}
+
+
+def _plain_at(level: str) -> tuple[str, ...]:
+    return tuple(level if flag == "-O2" else flag for flag in PLAIN)
+
+
+def _is_known(seen: dict[str, str], content: str, mutant: Mutant) -> bool:
+    return seen.setdefault(content, mutant.key) != mutant.key
+
+
+def _headers() -> bytes:
+    """Return what any object may be made of beside its own folder."""
+    places = (FIRMWARE, ROOT / "protocol" / "generated")
+    found = [path for place in places for path in sorted(place.rglob("*.h"))]
+    return b"".join(path.read_bytes() for path in [*found, *sorted(SUITES.glob("*.h"))])
 
 
 @dataclass(frozen=True, slots=True)
@@ -310,6 +386,13 @@ class Result:
     name: str
     verdicts: dict[str, str]
     survivors: list[Mutant]
+    made: int
+
+    @property
+    def judged(self) -> str:
+        """How many of those that were made."""
+        all_of_them = len(self.verdicts) == self.made
+        return "all" if all_of_them else f"{len(self.verdicts)} of {self.made}"
 
     def count(self, verdict: str) -> int:
         """How many ended so."""
@@ -333,8 +416,8 @@ def judge_file(
     """
     out.mkdir(parents=True, exist_ok=True)
     source = FIRMWARE / name
-    headers = b"".join(path.read_bytes() for path in sorted(FIRMWARE.rglob("*.h")))
-    of_file = sha256(source.read_bytes() + headers).hexdigest()
+    used = sorted(includes(source))
+    of_file = sha256(b"".join(path.read_bytes() for path in [source, *used])).hexdigest()
     texts = b"".join(p.read_bytes() for s in suites for p in sorted((SUITES / s).glob("*")))
     of_suites = sha256(texts).hexdigest()
     notes = out / f"{name.replace('/', '-')}.json"
@@ -343,11 +426,12 @@ def judge_file(
     seen: dict[str, str] = kept.get("seen", {}) if verdicts else {}
     if kept.get("suites") != of_suites:
         verdicts = {key: one for key, one in verdicts.items() if one != SURVIVED}
-    mutants = mutants_of(source)[:most]
+    made = mutants_of(source)
+    mutants = made[:most]
     waiting = [mutant for mutant in mutants if mutant.key not in verdicts]
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(jobs) as pool:
         if waiting:
-            judge = Judge(name, suites, Path(folder))
+            judge = Judge(name, suites, Path(folder), out / "objects")
             pairs = zip(waiting, pool.map(lambda m: judge.verdict(m, seen), waiting), strict=True)
             for at, (mutant, one) in enumerate(pairs):
                 verdicts[mutant.key] = one
@@ -358,7 +442,7 @@ def judge_file(
                     )  # fmt: skip
                     _progress(name, at + 1, len(waiting))
     known = {mutant.key: verdicts[mutant.key] for mutant in mutants}
-    return Result(name, known, [m for m in mutants if known[m.key] == SURVIVED])
+    return Result(name, known, [m for m in mutants if known[m.key] == SURVIVED], len(made))
 
 
 def _progress(name: str, done: int, whole: int) -> None:

@@ -4,6 +4,7 @@
 #include "check.h"
 #include "core/block.h"
 #include "core/bytes.h"
+#include "core/crc.h"
 #include "generated/cases.h"
 #include "generated/frames.h"
 
@@ -95,4 +96,90 @@ TEST_CASE("a file id depends on card, session and old content") {
   CHECK(core::make_file_id(cid, 7, block) != id);
   cid[15] = 0;
   CHECK(core::make_file_id(cid, 7, block) == id);
+}
+
+TEST_CASE("every field of a header stands at its place, and comes back from it") {
+  memset(block, 0, sizeof(block));
+  const core::BlockHeader header = {0x04030201U,
+                                    0x08070605U,
+                                    0x0C0B0A09U,
+                                    0x100F0E0DU,
+                                    0x14131211U,
+                                    0x0116,
+                                    core::BlockKind::kSchema};
+  core::put_block_header(block, header);
+  CHECK(memcmp(block, "FLT1", 4) == 0);
+  for (uint8_t i = 0; i < 20; ++i) {
+    CHECK_EQ(block[4 + i], i + 1);
+  }
+  CHECK_EQ(block[24], 0x16);
+  CHECK_EQ(block[25], 0x01);
+  CHECK_EQ(block[26], 1);
+  CHECK_EQ(block[27], 0);
+  core::Crc32 crc;
+  crc.add(block, 508);
+  core::put_le(block + 508, crc.value());
+  core::BlockHeader read = {};
+  REQUIRE(core::check_block(block, read) == core::BlockVerdict::kOk);
+  CHECK(read.file_id == header.file_id);
+  CHECK(read.session == header.session);
+  CHECK(read.sequence == header.sequence);
+  CHECK(read.schema_hash == header.schema_hash);
+  CHECK(read.dropped == header.dropped);
+  CHECK_EQ(read.used, header.used);
+  CHECK(read.kind == header.kind);
+}
+
+TEST_CASE("the first frame of an id is found wherever it stands, and none where there is none") {
+  memset(block, 0xA5, sizeof(block));
+  uint8_t* payload = block + core::kBlockHeaderSize;
+  const uint8_t ids[] = {
+      frames::kMagId, frames::kEventId, frames::kMagId, frames::kFileId, frames::kEventId};
+  uint16_t starts[6] = {};
+  for (uint8_t i = 0; i < 5; ++i) {
+    const uint8_t size = frames::wire_size(ids[i]);
+    payload[starts[i]] = ids[i];
+    // What a frame holds is no id: each byte is that of another kind.
+    for (uint8_t k = 1; k < size; ++k) {
+      payload[starts[i] + k] = ids[i] == frames::kMagId ? frames::kEventId : frames::kMagId;
+    }
+    payload[starts[i] + 5] = static_cast<uint8_t>(100 + i);
+    starts[i + 1] = static_cast<uint16_t>(starts[i] + size);
+  }
+  const uint16_t used = starts[5];
+  CHECK(core::find_frame(block, used, frames::kMagId) == payload);
+  CHECK(core::find_frame(block, used, frames::kEventId) == payload + starts[1]);
+  CHECK(core::find_frame(block, used, frames::kFileId) == payload + starts[3]);
+  CHECK(core::find_frame(block, used, frames::kIdentId) == nullptr);
+  CHECK(core::find_frame(block, 0, frames::kMagId) == nullptr);
+  CHECK(core::find_frame(block, starts[3], frames::kFileId) == nullptr);
+  CHECK(core::find_frame(block, static_cast<uint16_t>(starts[4] - 1), frames::kFileId) == nullptr);
+  CHECK(core::find_frame(block, starts[4], frames::kFileId) == payload + starts[3]);
+  CHECK(core::block_has_event(block, used, 101));
+  CHECK(core::block_has_event(block, used, 104));
+  CHECK(!core::block_has_event(block, used, 100));
+  CHECK(!core::block_has_event(block, used, 103));
+  CHECK(!core::block_has_event(block, static_cast<uint16_t>(used - 1), 104));
+  // A damaged block: what `used` counts may end before the place that is asked for.
+  CHECK_EQ(core::frame_at(block, starts[1], starts[1]), 0);
+  CHECK_EQ(core::frame_at(block, starts[1], starts[2]), 0);
+  CHECK_EQ(core::frame_at(block, starts[2], starts[1]), frames::kEventWireSize);
+  payload[0] = 0xFF;
+  CHECK(core::find_frame(block, used, frames::kEventId) == nullptr);
+}
+
+TEST_CASE("a file id is the CRC-32 of card, session and old block, in this order") {
+  uint8_t bytes[16 + 4 + core::kBlockSize];
+  for (uint16_t i = 0; i < sizeof(bytes); ++i) {
+    bytes[i] = static_cast<uint8_t>(i * 31U + 7U);
+  }
+  uint32_t definition = 0xFFFFFFFFU;
+  for (const uint8_t byte : bytes) {
+    definition ^= byte;
+    for (uint8_t bit = 0; bit < 8; ++bit) {
+      definition = (definition & 1U) != 0 ? definition >> 1 ^ 0xEDB88320U : definition >> 1;
+    }
+  }
+  const uint32_t session = core::get_le<uint32_t>(bytes + 16);
+  CHECK(core::make_file_id(bytes, session, bytes + 20) == ~definition);
 }

@@ -211,3 +211,150 @@ TEST_CASE("a closed ring lends its memory and takes no frame; an open one lends 
   CHECK(lender.lend() == nullptr);
   CHECK(lender.push_event(frames::Event::kMark, 3, 0));
 }
+
+namespace {
+
+// Fills a ring with events, which may use all of it, and frees `room` bytes behind the rest.
+void leave(core::ByteRing& ring, uint16_t room) {
+  ring.clear();
+  while (ring.free() >= room + frames::kEventWireSize) {
+    ring.push_event(frames::Event::kMark, 0, 0);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("a ring that was used is empty at its first byte when it is cleared") {
+  core::ByteRing ring(buffer, kCapacity);
+  ring.push(mag(1));
+  ring.push(mag(2));
+  ring.consume(frames::kMagWireSize);
+  ring.push(200, buffer, 5);
+  ring.clear();
+  CHECK_EQ(ring.used(), 0);
+  CHECK_EQ(ring.free(), kCapacity);
+  CHECK_EQ(ring.capacity(), kCapacity);
+  CHECK_EQ(ring.dropped(), 0U);
+  CHECK_EQ(ring.take_free_min(), kCapacity);
+  ring.push(mag(3));
+  CHECK_EQ(ring.used(), frames::kMagWireSize);  // nothing is told of before
+  uint16_t size = 0;
+  CHECK(ring.run(0, 400, size) == buffer);
+}
+
+TEST_CASE("each byte of room decides: 40 left for a frame, none for an event") {
+  // 400 - 39 * 10: as `capacity` grows, so does what is left behind the same events.
+  for (uint16_t extra = 0; extra <= 60; ++extra) {
+    core::ByteRing ring(buffer, static_cast<uint16_t>(300 + extra));
+    for (uint8_t i = 0; i < 30; ++i) {
+      REQUIRE(ring.push_event(frames::Event::kMark, 0, 0));
+    }
+    REQUIRE(ring.free() == extra);
+    CHECK_EQ(ring.push(mag(1)), extra >= frames::kMagWireSize + kReserve);
+    core::ByteRing other(buffer, static_cast<uint16_t>(300 + extra));
+    for (uint8_t i = 0; i < 30; ++i) {
+      other.push_event(frames::Event::kMark, 0, 0);
+    }
+    CHECK_EQ(other.push_event(frames::Event::kMark, 0, 0), extra >= frames::kEventWireSize);
+  }
+}
+
+TEST_CASE(
+    "behind a drop a small frame waits for room for the identification frame and the notice") {
+  const uint16_t wanted = frames::kIdentWireSize + frames::kEventWireSize + kReserve;
+  for (uint16_t extra = static_cast<uint16_t>(wanted - 2); extra <= wanted + 2; ++extra) {
+    core::ByteRing ring(buffer, static_cast<uint16_t>(200 + extra));
+    for (uint8_t i = 0; i < 20; ++i) {
+      ring.push_event(frames::Event::kMark, 0, 0);
+    }
+    ring.push(200, buffer, 5);  // dropped, for there is no such frame
+    CHECK_EQ(ring.push(mag(1)), extra >= wanted);
+    CHECK_EQ(ring.used(),
+             200 + (extra >= wanted ? frames::kMagWireSize + frames::kEventWireSize : 0));
+  }
+  // The identification frame itself, and what is longer, ask for their own size.
+  uint8_t fields[frames::kMaxWireSize] = {};
+  for (uint8_t id = 1; id < 255; ++id) {
+    const uint8_t size = frames::wire_size(id);
+    if (size < frames::kIdentWireSize || id == frames::kEventId) {
+      continue;
+    }
+    const uint16_t least = static_cast<uint16_t>(size + frames::kEventWireSize + kReserve);
+    for (uint16_t extra = static_cast<uint16_t>(least - 1); extra <= least; ++extra) {
+      core::ByteRing ring(buffer, static_cast<uint16_t>(100 + extra));
+      for (uint8_t i = 0; i < 10; ++i) {
+        ring.push_event(frames::Event::kMark, 0, 0);
+      }
+      ring.push(200, fields, 5);
+      CHECK_EQ(ring.push(id, fields, 6), extra == least);
+    }
+  }
+}
+
+TEST_CASE("a notice needs its ten bytes and no more, and an event squeezed in tells of nothing") {
+  for (uint16_t room = 0; room < 10; ++room) {
+    core::ByteRing ring(buffer, static_cast<uint16_t>(100 + room + 10));
+    for (uint8_t i = 0; i < 10; ++i) {
+      ring.push_event(frames::Event::kMark, 0, 0);
+    }
+    ring.push(200, buffer, 5);
+    CHECK(ring.push_event(frames::Event::kMark, 0, 0));
+    CHECK_EQ(ring.used(), 110);
+    CHECK(!ring.tell_dropped());
+    ring.consume(ring.whole(static_cast<uint16_t>(10 - room)));
+    CHECK_EQ(ring.tell_dropped(), room == 0);
+  }
+}
+
+TEST_CASE("more drops than a notice counts: it says 65535, the total goes on") {
+  core::ByteRing ring(buffer, kCapacity);
+  for (uint32_t i = 0; i < 65540U; ++i) {
+    ring.push(200, buffer, i + 3);
+  }
+  CHECK_EQ(ring.dropped(), 65540U);
+  CHECK(ring.tell_dropped());
+  const frames::EventFrame event = oldest_event(ring);
+  CHECK_EQ(event.arg, 65535U);
+  CHECK_EQ(event.t_us, 3U);
+}
+
+TEST_CASE("what fits whole is counted to the byte, and a run ends at the seam") {
+  core::ByteRing ring(buffer, kCapacity);
+  leave(ring, 50);
+  ring.consume(ring.whole(200));
+  CHECK_EQ(ring.used(), 150);
+  CHECK_EQ(ring.whole(0), 0);
+  CHECK_EQ(ring.whole(9), 0);
+  CHECK_EQ(ring.whole(10), 10);
+  CHECK_EQ(ring.whole(19), 10);
+  CHECK_EQ(ring.whole(149), 140);
+  CHECK_EQ(ring.whole(150), 150);
+  CHECK_EQ(ring.whole(480), 150);
+  for (uint8_t i = 0; i < 10; ++i) {
+    ring.push_event(frames::Event::kMark, i, i);
+  }
+  // 200 to 400 and from the first byte on.
+  uint16_t size = 0;
+  CHECK(ring.run(0, 480, size) == buffer + 200);
+  CHECK_EQ(size, 200);
+  CHECK(ring.run(199, 480, size) == buffer + 399);
+  CHECK_EQ(size, 1);
+  CHECK(ring.run(200, 50, size) == buffer);
+  CHECK_EQ(size, 50);
+  CHECK(ring.run(0, 200, size) == buffer + 200);
+  CHECK_EQ(size, 200);
+  CHECK(ring.run(0, 199, size) == buffer + 200);
+  CHECK_EQ(size, 199);
+  CHECK_EQ(ring.whole(480), 250);
+  ring.consume(200);
+  CHECK(ring.run(0, 480, size) == buffer);
+}
+
+TEST_CASE("the least room is that behind each frame, seen once") {
+  core::ByteRing ring(buffer, kCapacity);
+  ring.push(mag(1));
+  ring.consume(frames::kMagWireSize);
+  ring.push_event(frames::Event::kMark, 0, 0);
+  CHECK_EQ(ring.take_free_min(), kCapacity - frames::kMagWireSize);
+  CHECK_EQ(ring.take_free_min(), kCapacity - frames::kEventWireSize);
+}

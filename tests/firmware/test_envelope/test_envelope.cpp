@@ -119,3 +119,72 @@ TEST_CASE("a frame that is too long is refused") {
   uint8_t bytes[4];
   CHECK_EQ(core::put_envelope(bytes, 1, fields, core::kEnvelopeMaxFrame), 0);
 }
+
+TEST_CASE("the longest frame is put and decoded, one byte more is neither") {
+  uint8_t fields[200];
+  for (uint8_t i = 0; i < sizeof(fields); ++i) {
+    fields[i] = static_cast<uint8_t>(i + 1);
+  }
+  uint8_t bytes[core::kEnvelopeMaxFrame + core::kEnvelopeOverhead + 1];
+  memset(bytes, 0xEE, sizeof(bytes));
+  const uint8_t size = core::put_envelope(bytes, 9, fields, core::kEnvelopeMaxFrame - 1);
+  REQUIRE(size == sizeof(bytes) - 1);
+  CHECK_EQ(bytes[size], 0xEE);
+  core::EnvelopeDecoder decoder;
+  for (uint8_t i = 0; i < size; ++i) {
+    CHECK_EQ(decoder.byte(bytes[i]), i + 1 == size);
+  }
+  CHECK_EQ(decoder.frame_size(), core::kEnvelopeMaxFrame);
+  CHECK_EQ(decoder.pending(), 0);
+  CHECK_EQ(core::put_envelope(bytes, 9, fields, core::kEnvelopeMaxFrame + 1), 0);
+  CHECK_EQ(core::put_envelope(bytes, 9, fields, 200), 0);
+}
+
+TEST_CASE("a length of nothing or of too much fails as soon as it is read") {
+  const uint8_t lengths[] = {0, 129, 255};
+  for (const uint8_t length : lengths) {
+    core::EnvelopeDecoder decoder;
+    CHECK(!decoder.byte(0xA5));
+    CHECK_EQ(decoder.pending(), 1);
+    CHECK(!decoder.byte(0x5A));
+    CHECK_EQ(decoder.pending(), 2);
+    CHECK(!decoder.byte(length));
+    CHECK_EQ(decoder.failed(), 1);
+    CHECK_EQ(decoder.skipped(), 3U);
+    CHECK_EQ(decoder.pending(), 0);
+  }
+  // Its first byte alone is no sync: the next decides.
+  core::EnvelopeDecoder decoder;
+  decoder.byte(0xA5);
+  decoder.byte(0xA5);
+  CHECK_EQ(decoder.skipped(), 1U);
+  CHECK_EQ(decoder.pending(), 1);
+  CHECK_EQ(decoder.failed(), 0);
+  decoder.byte(0x00);
+  CHECK_EQ(decoder.skipped(), 3U);
+}
+
+TEST_CASE("frames inside an envelope that failed come out of one byte, one after the other") {
+  const uint8_t field = 0x42;
+  uint8_t inner[14];
+  const uint8_t first = core::put_envelope(inner, 1, &field, 1);
+  const uint8_t second = core::put_envelope(inner + first, 2, &field, 1);
+  REQUIRE(first + second == sizeof(inner));
+  core::EnvelopeDecoder decoder;
+  decoder.byte(0xA5);
+  decoder.byte(0x5A);
+  decoder.byte(sizeof(inner) - 2);  // the last two of them stand where its CRC would
+  for (uint8_t i = 0; i < sizeof(inner) - 1; ++i) {
+    CHECK(!decoder.byte(inner[i]));
+  }
+  REQUIRE(decoder.byte(inner[sizeof(inner) - 1]));
+  CHECK_EQ(decoder.frame()[0], 1);
+  CHECK_EQ(decoder.pending(), second);
+  REQUIRE(decoder.next());
+  CHECK_EQ(decoder.frame()[0], 2);
+  CHECK_EQ(decoder.frame_size(), 2);
+  CHECK_EQ(decoder.pending(), 0);
+  CHECK(!decoder.next());
+  CHECK_EQ(decoder.failed(), 1);
+  CHECK_EQ(decoder.skipped(), 3U);
+}
