@@ -9,6 +9,9 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from host.aircraft.gains import dimensional_name
 from host.aircraft.mode_names import LATERAL, LONGITUDINAL
 from host.errors import IdentificationError
 from host.files.user_text import read_toml
@@ -16,6 +19,7 @@ from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.mat_file import labels
 from host.sysid.linear.linear_answer import Answer
 from host.sysid.linear.linear_model import AXIS_OF
+from host.sysid.models.diagnostics import reference_values
 from host.sysid.models.modal_analysis import Mode
 
 if TYPE_CHECKING:
@@ -63,6 +67,32 @@ def true_modes(document: dict[str, Any], template: str) -> dict[str, tuple[float
         )
         for name in shared
     }
+
+
+def true_derivatives(document: dict[str, Any], template: str) -> dict[str, float]:
+    """Return dimensional derivatives averaged in the same way; none of an older truth file."""
+    tables = _of_axes(document, template, "dimensional")
+    if not tables:
+        return {}
+    return {name: sum(t[name] for t in tables) / len(tables) for name in tables[0]}
+
+
+def as_flown(document: dict[str, Any], answer: Answer) -> dict[str, Any]:
+    """Return the truth of the maneuvers that a linear answer was fitted to.
+
+    Derivatives go with the square of the airspeed, so those of a trim, or of a maneuver that was
+    held out, are others. Without times of the log's first row (several flights) all stay.
+    """
+    first = document.get("first_row_s")
+    if first is None:
+        return document
+    spans = [(m.start_s + first, m.end_s + first) for m in answer.used]
+    met = [
+        m
+        for m in document["maneuver"]
+        if any(begin < m["input_end_s"] and m["start_s"] < end for begin, end in spans)
+    ]
+    return document | {"maneuver": met} if met else document
 
 
 def true_poles(
@@ -130,6 +160,49 @@ def compared_coefficients(
     return found
 
 
+def compared_derivatives(answer: Answer, document: dict[str, Any]) -> list[TruthComparison]:
+    """Return the dimensional derivatives of a template that the truth has, of its maneuvers."""
+    truth, size = true_derivatives(document, answer.template), true_references(answer, document)
+    names = [p.name for p in answer.model.parameters]
+    half = dict(zip(names, answer.result.half_width(), strict=False))
+    found = []
+    for name in size:
+        own = answer.result.value(name), float(half[name]), truth[name], size[name]
+        found.append(TruthComparison(name, *own, small=size[name] > abs(truth[name])))
+    return found
+
+
+def true_references(answer: Answer, document: dict[str, Any]) -> dict[str, float]:
+    """Return what an error of each derivative is relative to, by the true ones and the motion.
+
+    The truth, or where it contributes less than 5 % of its row what would contribute 5 %.
+    """
+    truth = {} if answer.own_model else true_derivatives(document, answer.template)
+    names = [p.name for p in answer.model.parameters]
+    true = np.array([truth.get(n, answer.result.value(n)) for n in names])
+    size = reference_values(answer.model, answer.maneuvers, true)
+    return {n: max(float(size[k]), abs(truth[n])) for k, n in enumerate(names) if n in truth}
+
+
+def compared_estimates(answer: Answer, document: dict[str, Any]) -> list[TruthComparison]:
+    """Return the coefficients of a linear answer beside the truth; without any its derivatives."""
+    flown = as_flown(document, answer)
+    if answer.coefficients:
+        return compared_coefficients(answer.table, flown, coefficient_floors(answer, flown))
+    return compared_derivatives(answer, flown)
+
+
+def coefficient_floors(answer: Answer, document: dict[str, Any]) -> dict[str, float]:
+    """Return what would contribute 5 % of its row, of coefficients whose derivative is less."""
+    truth, size = true_derivatives(document, answer.template), true_references(answer, document)
+    found = {}
+    for c in answer.coefficients:
+        of = dimensional_name(c.name)
+        if size.get(of, 0.0) > abs(truth.get(of, 0.0)) and answer.result.value(of):
+            found[c.name] = size[of] * abs(c.value / answer.result.value(of))
+    return found
+
+
 def mode_comparisons(
     modes: Sequence[Mode], document: dict[str, Any], templates: Sequence[str]
 ) -> list[TruthComparison]:
@@ -160,17 +233,12 @@ def mode_comparisons(
     return found
 
 
-def truth_lines(
-    tables: Sequence[CoefficientTable],
-    document: dict[str, Any],
-    floors: Mapping[str, float] | None = None,
-) -> list[str]:
-    """Return a table of coefficients against the truth."""
-    found = [c for table in tables for c in compared_coefficients(table, document, floors or {})]
+def truth_lines(found: Sequence[TruthComparison]) -> list[str]:
+    """Return a table of estimates against the truth."""
     if not found:
-        return ["no coefficient to compare: name the aircraft (argument aircraft)"]
+        return ["nothing to compare: this file of truth has no derivatives of these models"]
     return [
-        "against the truth of the simulated flight (local derivatives, mean of maneuvers)",
+        "against the truth of the simulated flight (mean of maneuvers)",
         *map(_line, found),
         f"  {sum(c.covered for c in found)} of {len(found)} intervals hold the truth",
     ]
@@ -185,19 +253,20 @@ def truth_report_lines(
     """
     lines = []
     if direct:
-        lines = truth_lines(direct.tables, document, small_references(direct))
+        floors = small_references(direct)
+        lines = truth_lines(
+            [c for table in direct.tables for c in compared_coefficients(table, document, floors)]
+        )
         lines += mode_truth_lines(
             mode_comparisons(direct.modes, document, ("longitudinal", "lateral"))
         )
     else:
-        lines = truth_lines([a.table for a in answers], document)
+        lines = truth_lines([c for a in answers for c in compared_estimates(a, document)])
     for answer in answers:
-        own = mode_comparisons(answer.modes, document, (answer.template,))
+        own = mode_comparisons(answer.modes, as_flown(document, answer), (answer.template,))
         if direct:
             label = f"{answer.template}, {answer.result.method}"
-            lines += truth_summary(
-                label, [*compared_coefficients(answer.table, document, {}), *own]
-            )
+            lines += truth_summary(label, [*compared_estimates(answer, document), *own])
         else:
             lines += mode_truth_lines(own)
     return lines
@@ -242,8 +311,8 @@ def truth_document(
     """Return the comparison of every answer for JSON, by template."""
     found = {
         label: [
-            *compared_coefficients(a.table, document, {}),
-            *mode_comparisons(a.modes, document, (a.template,)),
+            *compared_estimates(a, document),
+            *mode_comparisons(a.modes, as_flown(document, a), (a.template,)),
         ]
         for a, label in zip(answers, labels(answers), strict=True)
     }
@@ -259,6 +328,7 @@ def truth_document(
                 "value": c.value,
                 "half_width": c.half_width,
                 "truth": c.truth,
+                "reference": c.reference,
                 "relative_error": c.error,
                 "inside": c.covered,
             }
@@ -272,6 +342,12 @@ def _line(c: TruthComparison) -> str:
     share = f"{100.0 * c.error:+7.1f} %" if isfinite(c.error) else "        -"
     small = " of 5 % of the row" if c.small else ""
     return (
-        f"  {c.name:21s} {c.value:9.4f} +- {c.half_width:7.4f}  truth {c.truth:9.4f}"
+        f"  {c.name:21s} {c.value:9.{_decimals(c)}f} +- {c.half_width:7.{_decimals(c)}f}"
+        f"  truth {c.truth:9.{_decimals(c)}f}"
         f"  error {share}{small}  {'inside' if c.covered else 'OUTSIDE'}"
     )
+
+
+def _decimals(c: TruthComparison) -> int:
+    """Return how many decimals five digits of a figure leave."""
+    return min(4, max(0, 5 - len(str(int(max(abs(c.value), abs(c.truth)))))))

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from host.aircraft.airframe import AILERON, ELEVATOR, Q0, Q3, RUDDER, STATES, Airframe, Array
+from host.aircraft.airframe import AILERON, ELEVATOR, Q0, Q3, RUDDER, STATES, Array
 from host.aircraft.attitude import euler
+from host.aircraft.flown_derivatives import FlownCondition, flown_derivatives, flown_modes
 from host.aircraft.linearisation import linear_aircraft_derivatives, linearise, modes
 from host.aircraft.local_derivatives import local_derivatives
-from host.aircraft.trim import TrimError, solve
 from host.export.toml import dumps
 from host.twin.flight.fly import FlightRecord
 from host.twin.flight.pilot import Window
@@ -65,7 +65,7 @@ def series(record: FlightRecord, data: AirData, stride: int = STRIDE) -> dict[st
 
 
 def maneuvers(record: FlightRecord, data: AirData) -> list[dict[str, object]]:
-    """Return each maneuver's window, mean condition and local derivatives.
+    """Return each maneuver's window, mean condition, local and dimensional derivatives, modes.
 
     Windows that the flight did not reach are left out.
     """
@@ -95,8 +95,17 @@ def _maneuver(
         ]
     )
     spread = float(np.clip(data.alpha_rad[inside].std(), 0.005, 0.05))
-    mean_speed = float(speed.mean())
-    density = float(data.density_kgpm3[inside].mean())
+    _, theta, _ = euler(record.states[inside, Q0 : Q3 + 1])
+    flown = FlownCondition(
+        airspeed_mps=float(speed.mean()),
+        alpha_rad=float(at[0]),
+        beta_rad=float(at[1]),
+        surfaces_rad=(float(at[5]), float(at[6]), float(at[7])),
+        thrust_n=float(record.thrust_n[inside].mean()),
+        density_kgpm3=float(data.density_kgpm3[inside].mean()),
+        climb_rad=float(theta.mean() - at[0]),
+    )
+    dimensional = flown_derivatives(frame, flown, spread)
     return {
         "kind": window.kind,
         "axes": list(window.axes),
@@ -105,36 +114,38 @@ def _maneuver(
         "end_s": window.end_s,
         "pilot_corrects_from_s": window.attention_s,
         "condition": {
-            "airspeed_mps": mean_speed,
-            "density_kgpm3": density,
+            "airspeed_mps": flown.airspeed_mps,
+            "density_kgpm3": flown.density_kgpm3,
             "qbar_pa": float(data.qbar_pa[inside].mean()),
-            "alpha_rad": float(at[0]),
-            "beta_rad": float(at[1]),
+            "alpha_rad": flown.alpha_rad,
+            "beta_rad": flown.beta_rad,
             "alpha_spread_rad": spread,
-            "elevator_rad": float(at[5]),
-            "thrust_n": float(record.thrust_n[inside].mean()),
+            "elevator_rad": flown.surfaces_rad[0],
+            "thrust_n": flown.thrust_n,
+            "climb_rad": flown.climb_rad,
         },
         "derivatives": (
             linear_aircraft_derivatives(frame, record.trim)
             if frame.linear > 0.0
             else local_derivatives(frame, at, spread)
         ),
-        "modes": _modes(
-            frame, mean_speed, density, motor=bool(record.thrust_n[inside].mean() > 0.0)
-        ),
+        "dimensional": dimensional,
+        "modes": _modes(record, dimensional, flown),
     }
 
 
 def _modes(
-    frame: Airframe, airspeed_mps: float, density: float, *, motor: bool
+    record: FlightRecord, dimensional: dict[str, float], flown: FlownCondition
 ) -> dict[str, object]:
-    try:
-        trim = solve(frame, airspeed_mps, density_kgpm3=density, motor=motor)
-    except TrimError:
-        return {}
+    """Return frequency (rad/s) and damping of each mode, where the maneuver was flown."""
+    frame = record.frame
+    found = (
+        modes(linearise(frame, record.trim))
+        if frame.linear > 0.0
+        else flown_modes(dimensional, flown, frame.gravity_mps2)
+    )
     return {
-        mode.name.replace(" ", "_"): [mode.frequency_radps, mode.damping]
-        for mode in modes(linearise(frame, trim))
+        mode.name.replace(" ", "_"): [float(mode.frequency_radps), mode.damping] for mode in found
     }
 
 
