@@ -15,6 +15,7 @@ from host.instrument.servo_prior import ServoPrior, servo_prior
 from host.physical.recording import Recording
 from host.sysid.estimators import fit
 from host.sysid.estimators.servo_parameters import (
+    CoarseDelays,
     ServoEstimate,
     _Profile,
     _rival,
@@ -79,7 +80,9 @@ def _found(
     def white(m: LinearModel, data: object, _: FitResult | None) -> FitResult:
         return fit("output-error-white", m, data, multiple_starts=False)  # type: ignore[arg-type]
 
-    servo = estimate_servo(model, behind, ["elevator_rad"], prior, white, white)
+    servo = estimate_servo(
+        model, behind, ["elevator_rad"], prior, white, CoarseDelays(model, behind, prior, white)
+    )
     return servo, servo.added_to(white(model, behind(servo.setting), None))
 
 
@@ -137,7 +140,9 @@ def test_a_servo_that_is_not_estimated_is_carried() -> None:
         raise IdentificationError("no")
 
     with pytest.raises(IdentificationError, match="no delay at which"):
-        estimate_servo(model, behind, ["elevator_rad"], WIDE, fails, fails)
+        estimate_servo(
+            model, behind, ["elevator_rad"], WIDE, fails, CoarseDelays(model, behind, WIDE, fails)
+        )
 
     def white(m: LinearModel, data: object, _: FitResult | None) -> FitResult:
         return fit("output-error-white", m, data, multiple_starts=False)  # type: ignore[arg-type]

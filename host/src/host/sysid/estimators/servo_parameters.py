@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -175,13 +176,46 @@ class _Profile:
         return [d for k, d in enumerate(at) if costs[k + 1] < min(costs[k], costs[k + 2])]
 
 
+class CoarseDelays:
+    """Delays far apart by a method that looks for where to begin; searched once, when asked.
+
+    Parameters
+    ----------
+    model : LinearModel
+    behind : callable
+        Maneuvers with the surfaces behind servos of these numbers.
+    prior : ServoPrior
+    quick : callable
+        The method.
+    """
+
+    def __init__(self, model: LinearModel, behind: Behind, prior: ServoPrior, quick: Fit) -> None:
+        self._profile = _Profile(model, behind, prior, quick)
+
+    @cached_property
+    def _asked(self) -> _Profile:
+        outwards = sorted(SCAN_S.tolist(), key=lambda d: abs(d - self._profile.prior.mean[0]))
+        self._profile.ask(outwards)
+        return self._profile
+
+    @property
+    def best(self) -> float:
+        """The delay that costs least."""
+        return self._asked.best
+
+    @property
+    def hollows(self) -> list[float]:
+        """The delays that cost less than both beside them."""
+        return self._asked.hollows
+
+
 def estimate_servo(
     model: LinearModel,
     behind: Behind,
     commanded: Sequence[str],
     prior: ServoPrior,
     fit: Fit,
-    quick: Fit,
+    coarse: CoarseDelays,
 ) -> ServoEstimate:
     """Return the servos by a method, the delay estimated jointly with a model's parameters.
 
@@ -193,9 +227,11 @@ def estimate_servo(
     commanded : sequence of str
         Inputs of the model that are commands.
     prior : ServoPrior
-    fit, quick : callable
-        The method, and one that looks for where to begin: far from the best delay a filter finds
-        other optima.
+    fit : callable
+        The method.
+    coarse : CoarseDelays
+        Where to begin, if next to nothing is known: far from the best delay a filter finds other
+        optima.
 
     Raises
     ------
@@ -205,14 +241,9 @@ def estimate_servo(
     profile = _Profile(model, behind, prior, fit)
     wide = prior.sd[0] > WIDE_DELAY_S
     step = FINE_S if wide else prior.sd[0]
-    coarse = _Profile(model, behind, prior, quick)
-    if wide:
-        coarse.ask(sorted(SCAN_S.tolist(), key=lambda d: abs(d - prior.mean[0])))  # outwards
-        profile.ask([coarse.best])
-    else:
-        profile.ask([prior.mean[0]])
+    profile.ask([coarse.best if wide else prior.mean[0]])
     delay, best, step, curvature = _least(profile, step)
-    rival_s = _rival(profile, best, coarse.hollows)
+    rival_s = _rival(profile, best, coarse.hollows if wide else [])
     at = profile.fits[best]
     sd = min(_colour(at) * float(curvature**-0.5), prior.sd[0])
     count = len(model.parameters)

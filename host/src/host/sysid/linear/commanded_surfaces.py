@@ -11,6 +11,7 @@ from host.errors import IdentificationError
 from host.sysid.estimators.filter_error_gust import fit_gust_state
 from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.servo_parameters import (
+    CoarseDelays,
     Fit,
     ServoEstimate,
     considered_servo,
@@ -46,15 +47,16 @@ def servo_of(chosen: ChosenModel, departures: Sequence[Array]) -> tuple[ServoEst
         moved = brought_behind(chosen.used, values)
         return remove_departures([m.cut(plain) for m in moved], departures)
 
+    coarse = CoarseDelays(plain, behind, prior, _white)
     remark = ""
     if chosen.gust_is_state:
         try:
             by = _with_gust(chosen.trim.airspeed_mps)
-            return estimate_servo(plain, behind, commanded, prior, by, _white), ""
+            return estimate_servo(plain, behind, commanded, prior, by, coarse), ""
         except IdentificationError as error:
             remark = f"the servos are those of output error: {error}"
     try:
-        return estimate_servo(plain, behind, commanded, prior, _white, _white), remark
+        return estimate_servo(plain, behind, commanded, prior, _white, coarse), remark
     except IdentificationError as error:
         considered = considered_servo(plain, behind, commanded, prior, _white)
         return considered, f"the servos were not estimated ({error}): carried as they usually are"
