@@ -127,6 +127,10 @@ def test_the_verb_writes_a_card_for_the_twin_and_one_for_the_logger(
     monkeypatch.setattr("host.planning.optimal_card.optimal_card", lambda *_, **__: found)
     text, data = tmp_path / "optimal.toml", tmp_path / "flight.card"
     asked = ["plan", "--optimal", "--flights", "0", "--save", str(text), "--card", str(data)]
+    assert main(asked) == 2  # of which aircraft?
+    assert not data.exists()
+    assert "name the aircraft" in capsys.readouterr().err
+    asked += ["--aircraft", "ultrastick25e"]
     assert main([*asked, "--amplitude", "0.33"]) == 0
     said = capsys.readouterr()
     assert "default calibration" in said.err

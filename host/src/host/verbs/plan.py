@@ -192,6 +192,10 @@ def _check(args: argparse.Namespace) -> None:
         raise UsageError(f"--gusts is {args.gusts:g} m/s, expected 0 to {MOST_GUSTS_MPS:g}")
     if not 0.01 <= args.amplitude <= 1.0:
         raise UsageError(f"--amplitude is {args.amplitude:g}, expected 0.01 to 1")
+    if args.logger_card is not None and args.card is None and args.aircraft is None:
+        raise UsageError(
+            "--card is flown by the logger: name the aircraft it is designed for, --aircraft FILE"
+        )
     if args.logger_card is not None:
         check_destination("--card", args.logger_card, folder=False)
     if args.save is not None and args.save.suffix != ".toml":
