@@ -145,8 +145,13 @@ def test_flight_path_of_an_aircraft_at_rest_in_a_turn_stands_still() -> None:
         r * u - p * w - G * np.cos(alpha) * np.sin(phi),
         -q * u - G * np.cos(alpha) * np.cos(phi),
     ]
-    found = rates(shipped("flight_path"), x, np.array([0.0, 0.0, 0.0, *force, p, q, r]))
+    found = rates(shipped("flight_path"), x, np.array([*force, p, q, r]))
     assert list(found.values()) == pytest.approx([0.0] * 5, abs=1e-9)
+
+
+def test_flight_path_needs_no_surface() -> None:
+    """A record without surfaces was refused, though they drive nothing of it."""
+    assert shipped("flight_path").controls() == ()
 
 
 @pytest.mark.parametrize("name", ["lateral", "six_degrees", "flight_path"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -146,6 +147,31 @@ def test_a_model_without_inputs_is_fitted_to_a_stretch(tmp_path: Path) -> None:
     for name, value in (("stiffness", 25.0), ("damping", 0.4)):
         k = result.index(name)
         assert abs(result.estimate[k] - value) < 1.5 * half[k] < 0.2 * value, name
+
+
+def test_a_record_without_surfaces_is_fitted_whole(tmp_path: Path) -> None:
+    """It was refused for want of a surface."""
+    text, record = swinging()
+    model = tmp_path / "pendulum.toml"
+    model.write_text("inputs = []\n" + text, encoding="utf-8")
+    how: dict[str, Any] = {"models": model, "methods": "output-error-white"}
+    record = record.head(60)
+    whole = host.identify(record, **how).linear[0].result
+    given = host.identify(record, **how, from_s=0.0, to_s=6.0).linear[0].result
+    np.testing.assert_array_equal(whole.estimate, given.estimate)
+
+
+def test_measured_columns_alone_may_drive_equations(tmp_path: Path) -> None:
+    """Nothing that a pilot moves could drive what a fit left: an index beyond an empty list."""
+    text, record = swinging()
+    model = tmp_path / "pendulum.toml"
+    moved = text.replace('damping*p_radps"', 'damping*p_radps + push_radps2"')
+    model.write_text('inputs = []\ncolumns = ["push_radps2"]\n' + moved, encoding="utf-8")
+    pushed = record.assign(push_radps2=0.0).head(100)
+    result = host.identify(pushed, models=model, methods="output-error").linear[0].result
+    for name, value in (("stiffness", 25.0), ("damping", 0.4)):
+        k = result.index(name)
+        assert abs(result.estimate[k] - value) < 1.5 * result.half_width()[k] < 0.3 * value, name
 
 
 def test_a_parameter_that_acts_on_nothing_is_named(tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ from host.sysid.reconstruction.flight_path import (
 )
 from host.sysid.reconstruction.path_fit import fit_path
 from host.sysid.reconstruction.path_preparation import (
+    FEWEST_FIXES,
     prepare_path_problem,
     vane_delay_by_file,
 )
@@ -314,6 +315,26 @@ def test_without_gps_the_pitot_scale_is_called_unobservable() -> None:
     findings = compatibility_document(found)["findings"]
     assert isinstance(findings, dict)
     assert findings["pitot_scale"]["told"] is False
+
+
+@pytest.mark.parametrize("seen", [0, FEWEST_FIXES - 1])
+def test_gps_in_the_cruise_alone_is_no_gps(seen: int) -> None:
+    """Residuals of no fix were a sum over nothing, those of one had no power."""
+    columns, _ = flown(2)
+    problem, _, cuts = prepare_path_problem(columns, AIRFRAME, INSTRUMENT)
+    first = int(np.searchsorted(columns["t_s"], cuts[0][0]))
+    fixes = problem.segments[0].fixes
+    last = first + int(fixes[fixes >= 0][seen - 1]) if seen else first - 1
+    held = np.minimum(np.arange(len(columns["t_s"])), last)
+    cruise = {k: v[held] if k.startswith("v_") else v for k, v in columns.items()}
+    alone = {k: v for k, v in columns.items() if not k.startswith("v_")}
+    here, there = (reconstruct(x, AIRFRAME, INSTRUMENT) for x in (cruise, alone))
+    assert not here.gps
+    assert here.findings == there.findings
+    assert here.rms == there.rms
+    blind = {k: v for k, v in cruise.items() if k not in ("alpha_rad", "beta_rad")}
+    with pytest.raises(IdentificationError, match="GPS has no fixes where the aircraft moved"):
+        reconstruct(blind, AIRFRAME, INSTRUMENT)
 
 
 def test_without_gps_an_error_of_the_imu_does_not_pass_for_the_vanes_zero() -> None:

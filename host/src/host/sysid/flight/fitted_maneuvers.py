@@ -9,6 +9,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.errors import IdentificationError
+from host.sysid.checks.small_inputs import free_motion
 from host.sysid.flight.reconstructed_flight import (
     FlownManeuver,
     ReconstructedFlight,
@@ -28,8 +29,9 @@ class NoManeuverError(IdentificationError):
 
 
 def fitted_and_held_out(
-    flights: Sequence[ReconstructedFlight], axes: Sequence[str], template: str, *, named: bool
-) -> tuple[list[FlownManeuver], list[FlownManeuver]]:
+    flights: Sequence[ReconstructedFlight], axes: Sequence[str], template: str, *, named: bool,
+    free: bool = False,
+) -> tuple[list[FlownManeuver], list[FlownManeuver]]:  # fmt: skip
     """Return the maneuvers to fit and those to hold out.
 
     Parameters
@@ -47,6 +49,8 @@ def fitted_and_held_out(
     NoManeuverError
         If there is none.
     """
+    if free:
+        flights = [f if f.maneuvers else _in_free_motion(f) for f in flights]
     own = [_of_axes(flight.maneuvers, axes, template, named=named) for flight in flights]
     mine = flown_maneuvers(flights, joined_windows(own))
     if not mine:
@@ -56,6 +60,10 @@ def fitted_and_held_out(
     good = [m for m in mine if _worth_it(m)] or mine
     held = _held_out([m for m in good if not m.found.given])
     return [m for m in good if m not in held], [replace(m, found=m.found.response()) for m in held]
+
+
+def _in_free_motion(flight: ReconstructedFlight) -> ReconstructedFlight:
+    return replace(flight, maneuvers=tuple(free_motion(flight.corrected)))
 
 
 def _of_axes(

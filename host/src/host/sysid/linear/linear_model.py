@@ -137,7 +137,10 @@ def choose_model(
         If there is no maneuver of the model, or the method needs an airspeed that is not known.
     """
     axes = AXIS_OF[template_name] if own is None else excited_axes(own.inputs)
-    used, held = fitted_and_held_out(flights, axes, template_name, named=named or own is not None)
+    free = own is not None and not own.controls()
+    used, held = fitted_and_held_out(
+        flights, axes, template_name, named=named or own is not None, free=free
+    )
     trim, condition = trim_of(columns_of(used))
     if own is None:
         model, by, remarks = template_and_method(used, trim, template_name, method)

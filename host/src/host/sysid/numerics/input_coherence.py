@@ -365,7 +365,7 @@ def _scaled_eigen(inner: Array, w: _Data, variance: float) -> tuple[Array, Array
     """Return scale, eigenvalues and vectors of the columns that are not spoken for."""
     scale = np.sqrt(np.maximum(np.diag(_gram(w.added)) / variance, 1e-300))
     value, vector = np.linalg.eigh(inner / np.outer(scale, scale))
-    kept = value > RANK * max(float(value[-1]), RANK)
+    kept = value > RANK * np.max(value, initial=RANK)
     return scale, value[kept], vector[:, kept]
 
 

@@ -194,6 +194,8 @@ def _record(columns: Mapping[str, Array], found: Compatibility, airframe: Airfra
     t = columns["t_s"]
     block = max(1, round(STEP_S / float(t[1] - t[0])))
     rows = len(t) // block
+    if rows < 2:
+        raise IdentificationError("flow angles are not reconstructed: nothing flew")
 
     def mean(name: str) -> Array:
         values = columns.get(name, np.zeros(len(t)))

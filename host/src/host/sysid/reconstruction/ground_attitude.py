@@ -94,7 +94,7 @@ def standstill(columns: Mapping[str, Array]) -> slice | None:
     t, speed = columns["t_s"], np.nan_to_num(columns["airspeed_mps"])
     flying = speed > max(FLYING_SHARE * float(np.median(speed)), LEAST_SPEED_MPS)
     ground = int(np.argmax(flying)) if flying.any() else len(t)
-    count = round(LEAST_S / float(t[1] - t[0]))
+    count = max(round(LEAST_S / float(t[1] - t[0])), 2)
     rates, force = (np.column_stack([columns[n] for n in NEEDED[k : k + 3]]) for k in (1, 4))
     rolling = np.hypot(*(columns.get(name, np.zeros(len(t))) for name in GROUND_SPEED))
     # The moment of the launch is no standstill: the last one ends its own length before it.

@@ -47,6 +47,8 @@ SHORT_SEGMENT_S = 6.0  # without GPS nothing holds the path for longer
 WITHOUT_GPS = (*INERTIAL[0:3], *FLOW, *DELAYS, DELAY_DIFFERENCE)
 MOST_SEGMENTS = 8
 LEAST_EXCITATION = 0.1  # of the most excited segment: initial value of each axis
+# Three velocities each: fewer say no more than a segment's start, the wind and GPS's delay take.
+FEWEST_FIXES = 1 + (len(START) + len(WITH_GPS)) // len(GPS)
 QUADRANTS = 4  # of heading: wind and pitot scale need them
 INPUT_LAGS = (*range(0, 10), *range(10, 31, 2))  # in blocks: duration of a response
 START_SD = np.array([1.0, 1.0, 1.0, *np.radians([5.0, 5.0, 20.0])])
@@ -70,6 +72,7 @@ def prepare_path_problem(
 ) -> tuple[PathProblem, list[Array], tuple[tuple[float, float], ...]]:
     """Return the problem, the lagged inputs of every segment, and begin and end of each (s).
 
+    GPS without a fix in any segment is no GPS: a flight may have it in the cruise alone.
     `usual` gives the priors of sensors of which no file speaks.
 
     Raises
@@ -100,6 +103,16 @@ def prepare_path_problem(
     data[SMOOTHED] = local_polynomial(data[AIR[0]][:, None], 2 * half + 1, 2)[:, 0]
     fixes = gps_fixes(data) if gps else np.zeros(len(data["t_s"]), dtype=bool)
     cuts = _select_segments(data, dt_s, block, SEGMENT_S if gps else SHORT_SEGMENT_S)
+    for cut in cuts:
+        fixes[cut] &= np.sum(fixes[cut]) >= FEWEST_FIXES
+    if gps and not any(fixes[cut].any() for cut in cuts):
+        if not vanes:
+            raise IdentificationError(
+                f"data compatibility: GPS has no fixes where the aircraft moved most, and without"
+                f" it {AIR[1]} and {AIR[2]} are needed"
+            )
+        without = {name: values for name, values in columns.items() if name not in GPS}
+        return prepare_path_problem(without, airframe, instrument, usual)
     vane = 0.0 if instrument is None else 1.0 / (2.0 * np.pi * instrument.vane_hz_per_mps)
     place = np.zeros(3)
     if airframe is not None and airframe.vanes_m:

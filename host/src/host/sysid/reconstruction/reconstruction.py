@@ -254,10 +254,9 @@ def _beside_imu(
     """
     bias, tilt = priors["accel_bias_x_mps2"][1] / GRAVITY_MPS2, priors["imu_tilt_y_rad"][1]
     by_data = estimate[1] ** -2 - sd**-2
-    measured = estimate[0] * estimate[1] ** -2 / by_data
-    variance = 1.0 / by_data + bias**2 + tilt**2
-    left = 1.0 / (1.0 / variance + sd**-2)
-    return measured * left / variance, float(np.sqrt(left))
+    looks_alike = 1.0 + by_data * (bias**2 + tilt**2)
+    left = 1.0 / (by_data / looks_alike + sd**-2)
+    return estimate[0] * estimate[1] ** -2 * left / looks_alike, float(np.sqrt(left))
 
 
 def _known_better(estimate: tuple[float, float], by_file: tuple[float, float]) -> bool:
