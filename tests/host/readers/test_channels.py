@@ -116,6 +116,16 @@ def test_flaperons_and_two_motors() -> None:
     np.testing.assert_allclose(out["throttle_difference"], [-0.2, 0.0])
 
 
+def test_flaperons_of_px4() -> None:
+    """Both ailerons down by the flap: what they share is no aileron (CA_SV_CSn_FLAP)."""
+    roll, flap = np.array([0.2, -0.1, 0.0]), np.array([0.3, 0.3, 0.1])
+    out = allocated_surfaces(
+        {0: -roll - flap, 1: roll - flap},
+        {"CA_SV_CS_COUNT": 2.0, "CA_SV_CS0_TYPE": 1.0, "CA_SV_CS1_TYPE": 2.0},
+    )
+    np.testing.assert_allclose(out.shares["aileron"], roll)
+
+
 def test_an_output_stands_until_the_next_pulse() -> None:
     """Of every second pulse of 50 Hz the one between is on the curve, and each one stands."""
     t = np.arange(0.0, 1.0, 0.04)

@@ -16,6 +16,7 @@ from host.readers.judgement import Judgement, judge
 from host.readers.log_formats import read_messages
 from host.readers.named_channels import Channels
 from host.readers.px4_channels import not_flying_signals, px4_channels
+from scipy.spatial.transform import Rotation
 
 from tests.host.readers.autopilot_flights import write
 
@@ -120,6 +121,51 @@ def test_a_vtol_on_its_rotors_does_not_fly(px4: AutopilotLog) -> None:
         messages = {**px4.messages, "vehicle_status": {0: Messages(status.t_s, fields)}}
         found = judged(replace(px4, vehicle="vtol", messages=messages))
         assert ("a VTOL that never flew" in found.refusal) is refused
+
+
+def test_a_tailsitter_is_turned_to_forward_flight(px4: AutopilotLog) -> None:
+    """Its log has the axes of hover: x down and z back in flight, so that roll was yaw."""
+    messages = dict(px4.messages)
+    for topic, field in (("vehicle_angular_velocity", "xyz"), ("vehicle_acceleration", "xyz"),
+                         ("sensor_combined", "gyro_rad"),
+                         ("sensor_combined", "accelerometer_m_s2")):  # fmt: skip
+        if topic not in messages:
+            continue
+        one = messages[topic][0]
+        x, y, z = (one.fields[f"{field}[{k}]"] for k in range(3))
+        hover = {f"{field}[0]": z, f"{field}[1]": y, f"{field}[2]": -x}
+        messages[topic] = {0: Messages(one.t_s, {**one.fields, **hover})}
+    attitude = messages["vehicle_attitude"][0]
+    q = np.array([attitude.fields[f"q[{k}]"] for k in range(4)])
+    turn = Rotation.from_euler("y", -90.0, degrees=True)
+    turned = (Rotation.from_quat(q[[1, 2, 3, 0]].T) * turn).as_quat().T[[3, 0, 1, 2]]
+    fields = {f"q[{k}]": turned[k] for k in range(4)}
+    messages["vehicle_attitude"] = {0: Messages(attitude.t_s, fields)}
+    status = messages["vehicle_status"][0]
+    fields = {**status.fields, "is_vtol_tailsitter": np.ones(len(status))}
+    messages["vehicle_status"] = {0: Messages(status.t_s, fields)}
+    log = replace(px4, vehicle="vtol", messages=messages)
+    found, right = px4_channels(log, {}), px4_channels(px4, {})
+    for name, signal in right.signals.items():
+        np.testing.assert_allclose(found.signals[name].values, signal.values, atol=2e-6)
+    assert any("is_vtol_tailsitter" in note for note in found.notes)
+
+
+def test_demands_of_a_tailsitter_are_turned_too(px4: AutopilotLog) -> None:
+    t, kept = np.arange(0.0, 5.0, 0.01), ("vehicle_status", "vehicle_attitude")
+    roll, pitch, yaw = (0.3 * np.sin((k + 1) * t) for k in range(3))
+    status = Messages(np.array([0.0, 5.0]), {"is_vtol_tailsitter": np.ones(2)})
+    hover = {"xyz[0]": yaw, "xyz[1]": pitch, "xyz[2]": -roll}
+    messages = {k: px4.messages[k] for k in kept} | {"vehicle_status": {0: status}}
+    messages["vehicle_torque_setpoint"] = {1: Messages(t, hover)}
+    found = px4_channels(replace(px4, vehicle="vtol", messages=messages), {}).signals
+    for name, right in (("aileron", roll), ("elevator", -pitch), ("rudder", -yaw)):
+        np.testing.assert_allclose(found[name].values, right, atol=1e-9)
+
+
+def test_telemetry_of_a_tailsitter_is_refused_by_that_name(px4: AutopilotLog) -> None:
+    found = judged(replace(px4, format="tlog", vehicle="tailsitter"))
+    assert "of a tailsitter: it does not say" in found.refusal
 
 
 def test_a_sensor_that_is_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -126,6 +126,11 @@ def _vehicle_line(log: AutopilotLog, flown: Airborne) -> str:
 
 def _refusal(log: AutopilotLog, flown: Airborne, missing: Sequence[str]) -> str:
     where = f"{log.path}: {FORMATS[log.format]}"
+    if log.vehicle == "tailsitter":
+        return (
+            f"{where} of a tailsitter: it does not say whether attitude and rates are those of"
+            " hover or of forward flight, so nothing of it can be identified; its ULog says it"
+        )
     if log.vehicle not in WINGED:
         return (
             f"{where} of a {log.vehicle}, which does not fly on a wing: nothing of it can be"

@@ -21,6 +21,7 @@ from host.readers.px4_outputs import (
     axis_demands,
     surfaces_of_pulses,
 )
+from host.readers.px4_tailsitter import NOTE, forward_attitude, forward_flight, tailsitter
 from host.readers.signals import Signal
 from host.readers.written_parameters import made_of_outputs
 
@@ -45,6 +46,8 @@ FORCE_TOPICS = (
 def px4_channels(log: AutopilotLog, chosen: Mapping[str, int]) -> Channels:
     """Return the channels of a ULog; `chosen` names instances by topic."""
     found = Channels(output_period_s=1.0 / 50.0)
+    if by := tailsitter(log):
+        found.notes.append(NOTE.format(by))
     for name in chosen:
         instance_of(log, name, chosen, [])
     _inertial(log, chosen, found)
@@ -88,6 +91,12 @@ def _vector(messages: Messages, field: str, size: int = 3) -> list[Array] | None
     return [numbers(messages.fields[name]) for name in names]
 
 
+def _body_vector(log: AutopilotLog, messages: Messages, field: str) -> list[Array] | None:
+    """Return a vector in axes with x forward in flight."""
+    values = _vector(messages, field)
+    return forward_flight(values) if values is not None and tailsitter(log) else values
+
+
 def _inertial(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
     _first_fast(log, chosen, found, RATES, RATE_TOPICS)
     _first_fast(log, chosen, found, FORCES, FORCE_TOPICS)
@@ -104,7 +113,7 @@ def _first_fast(
     able = []
     for topic, field, cutoff in topics:
         one = instance_of(log, topic, chosen, found.notes)
-        values = _vector(one[0], field) if one is not None else None
+        values = _body_vector(log, one[0], field) if one is not None else None
         if one is not None and values is not None and len(one[0]) > 1:
             able.append((_rate_hz(one[0]), *one, field, values, cutoff))
     if not able:
@@ -123,6 +132,7 @@ def _attitude(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> 
     if att is None or q is None:
         return
     size = np.sqrt(sum(x * x for x in q))
+    q = forward_attitude(q) if tailsitter(log) else q
     whole = np.abs(size - 1.0) < 0.05  # another length is a changed bit
     w, x, y, z = (np.where(whole, part, np.nan) for part in q)
     angles = {
@@ -318,8 +328,11 @@ def _axes(log: AutopilotLog, _chosen: Mapping[str, int]) -> tuple[Messages, Outp
             continue
         wing = every.get(1) if log.vehicle == "vtol" and topic.startswith("vehicle") else None
         messages = wing or (every[min(every)] if every else None)
-        values = _vector(messages, field) if messages is not None else None
-        if messages is not None and values is not None and len(messages) > 1:
+        if messages is None or len(messages) < 2:
+            continue
+        hover = topic == "vehicle_torque_setpoint"  # what the mixer's groups hold is the wing's own
+        values = _body_vector(log, messages, field) if hover else _vector(messages, field)
+        if values is not None:
             return messages, axis_demands(values, topic)
     return None
 

@@ -28,6 +28,7 @@ from host.readers.clock_epochs import clock_sets, epoch_starts
 from host.readers.mavlink_frames import Frames, frames_of
 from host.readers.mavlink_layout import Layout, layouts
 from host.readers.plausible_times import plausible_times
+from host.readers.px4_tailsitter import MAV_TYPES
 from host.readers.ulog_messages import BY_MAV_TYPE
 from host.readers.written_parameters import Parameters
 
@@ -138,7 +139,7 @@ def read_tlog(path: Path) -> list[AutopilotLog]:
                 path=path,
                 format="tlog",
                 autopilot=AUTOPILOTS.get(autopilot, "ardupilot"),
-                vehicle=BY_MAV_TYPE.get(kind, ""),
+                vehicle=_vehicle(kind, autopilot),
                 firmware=next((t for t in texts if "ardu" in t.lower() or "px4" in t.lower()), ""),
                 messages=messages,
                 parameters={},
@@ -286,6 +287,12 @@ def _heartbeat(received: _Received, sender: int) -> tuple[int, int] | None:
         if kind != GROUND_STATION and autopilot != NO_AUTOPILOT
     ]
     return beats[len(beats) // 2] if beats else None
+
+
+def _vehicle(kind: int, autopilot: int) -> str:
+    if AUTOPILOTS.get(autopilot) == "px4" and kind in MAV_TYPES:
+        return "tailsitter"
+    return BY_MAV_TYPE.get(kind, "")
 
 
 def _damage(received: _Received) -> list[str]:
