@@ -168,6 +168,14 @@ TEST_CASE("the settings as shown, and at their longest still one whole line") {
   core::TextLine shown;
   core::put_answer(shown, core::ImuReply::kShow, settings);
   CHECK(says(shown, "imu -7 -6 -5 7 6 5 413 3 1 1\r\n"));
+  settings.dlpf = settings.compat = settings.offsets_valid = 0;
+  settings.rate_offset[0] = 10;
+  settings.force_offset[2] = -1;
+  core::TextLine zeros;
+  core::put_answer(zeros, core::ImuReply::kShow, settings);
+  CHECK(says(zeros, "imu 10 -6 -5 7 6 -1 413 0 0 0\r\n"));
+  settings.dlpf = 3;
+  settings.compat = settings.offsets_valid = 1;
   for (uint8_t axis = 0; axis < 3; ++axis) {
     settings.rate_offset[axis] = INT16_MIN;
     settings.force_offset[axis] = INT16_MIN;

@@ -219,3 +219,83 @@ TEST_CASE(
   core::read_input_settings(record, config, read);
   CHECK_EQ(uint16_t{read.switch_armed_min_us}, 0);
 }
+
+TEST_CASE(
+    "a record of another size is another version's, whichever way; the rest of a frame is 0") {
+  for (int8_t by = -1; by <= 1; by = static_cast<int8_t>(by + 2)) {
+    Record record;
+    record.bytes[3] = static_cast<uint8_t>(core::kSettingsSize + by);
+    record.seal();
+    frames::ConfigFrame out;
+    CHECK(record.read(out) == SettingsStatus::kOtherVersion);
+    CHECK_EQ(out.hold_ms, 0);
+  }
+  Record record;
+  record.bytes[2] = frames::kVersion - 1;
+  record.seal();
+  frames::ConfigFrame out;
+  CHECK(record.read(out) == SettingsStatus::kOtherVersion);
+  const Record good;
+  memset(&out, 0xEE, sizeof(out));
+  CHECK(good.read(out) == SettingsStatus::kOk);
+  CHECK_EQ(out.t_us, 0U);
+  CHECK_EQ(good.bytes[0], 'F');
+  CHECK_EQ(good.bytes[1], 'S');
+}
+
+TEST_CASE("each of five channels has an input of its own, thresholds are 100 us apart") {
+  frames::ConfigFrame config;
+  for (uint8_t a = 0; a < 5; ++a) {
+    for (uint8_t b = 0; b < 5; ++b) {
+      core::default_settings(config);
+      uint8_t inputs[] = {0, 1, 2, 3, 4};
+      inputs[a] = inputs[b];
+      config.input_aileron = inputs[0];
+      config.input_elevator = inputs[1];
+      config.input_rudder = inputs[2];
+      config.input_throttle = inputs[3];
+      config.input_switch = inputs[4];
+      CHECK_EQ(core::settings_in_range(config), a == b);
+    }
+  }
+  core::default_settings(config);
+  config.switch_mega_min_us = static_cast<uint16_t>(config.switch_direct_max_us + 100);
+  CHECK(core::settings_in_range(config));
+}
+
+TEST_CASE("the inputs' record: its letters, its fields, the CRC-16 of both; each bit counts") {
+  frames::ConfigFrame config;
+  core::default_settings(config);
+  uint8_t record[core::kInputSettingsRecordSize];
+  frames::InputConfigFrame wanted = {};
+  wanted.switch_armed_min_us = 1950;
+  core::write_input_settings(record, wanted);
+  CHECK_EQ(record[0], 'I');
+  CHECK_EQ(record[1], 'S');
+  const uint8_t sum_at = core::kInputSettingsRecordSize - 2;
+  CHECK_EQ(core::get_le<uint16_t>(record + sum_at), core::crc16(0xFFFF, record, sum_at));
+  frames::InputConfigFrame read;
+  for (uint16_t bit = 0; bit < 8 * core::kInputSettingsRecordSize; ++bit) {
+    record[bit / 8] = static_cast<uint8_t>(record[bit / 8] ^ 1U << bit % 8);
+    memset(&read, 0xEE, sizeof(read));
+    core::read_input_settings(record, config, read);
+    CHECK_EQ(uint16_t{read.switch_armed_min_us}, 1850);
+    record[bit / 8] = static_cast<uint8_t>(record[bit / 8] ^ 1U << bit % 8);
+  }
+  memset(&read, 0xEE, sizeof(read));
+  core::read_input_settings(record, config, read);
+  CHECK_EQ(uint16_t{read.switch_armed_min_us}, 1950);
+  CHECK_EQ(read.t_us, 0U);
+  // 100 us of its own on either side of the threshold: 1950 goes with 1750, not with 1751.
+  config.switch_mega_min_us = 1750;
+  core::read_input_settings(record, config, read);
+  CHECK_EQ(uint16_t{read.switch_armed_min_us}, 1950);
+  config.switch_mega_min_us = 1751;
+  core::read_input_settings(record, config, read);
+  CHECK_EQ(uint16_t{read.switch_armed_min_us}, 0);
+  config.switch_mega_min_us = 1650;
+  wanted.switch_armed_min_us = 1849;
+  core::write_input_settings(record, wanted);
+  core::read_input_settings(record, config, read);
+  CHECK_EQ(uint16_t{read.switch_armed_min_us}, 1850);
+}

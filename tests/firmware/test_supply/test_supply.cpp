@@ -73,3 +73,40 @@ TEST_CASE("a record counts whole, and only for a reference that a chip may have"
   const uint8_t erased[core::kReferenceRecordSize] = {0xFF, 0xFF, 0xFF, 0xFF};
   CHECK_EQ(core::read_reference(erased), 0);
 }
+
+TEST_CASE("what the boot found low no single measurement makes good, and a boot counts anew") {
+  core::SupplyWatch watch;
+  CHECK(!watch.passes(4100, 0));
+  CHECK(!watch.measured(4100, 0));
+  CHECK(!watch.good());
+  CHECK(watch.passes(4125, 0));
+  watch.measured(4124, 0);
+  CHECK(watch.measured(4124, 0));
+  CHECK(watch.passes(5000, 0));
+  CHECK(watch.measured(4124, 0));
+  CHECK(watch.measured(4124, 0));
+  CHECK(!watch.measured(4124, 0));
+  for (uint16_t i = 0; i < 600; ++i) {
+    CHECK(!watch.measured(4124, 0));
+  }
+  CHECK(watch.measured(4125, 0));
+  CHECK(watch.measured(4124, 0));
+}
+
+TEST_CASE("4.5 V to the millivolt, by the widest part where it is not calibrated") {
+  CHECK(core::supply_good(4500, 1100));
+  CHECK(!core::supply_good(4499, 1100));
+  CHECK(core::supply_good(4950, 1000));
+  CHECK(!core::supply_good(4949, 1000));
+  CHECK(core::supply_good(4125, 0));
+  CHECK(!core::supply_good(4124, 0));
+  CHECK_EQ(core::supply_mv(5500, 1000), 5000);
+  CHECK_EQ(core::supply_mv(5501, 1000), 5000);
+  CHECK_EQ(core::supply_mv(60000, 1200), 65454);
+  uint8_t record[core::kReferenceRecordSize];
+  const uint16_t taken[] = {1000, 1200};
+  for (const uint16_t reference_mv : taken) {
+    core::write_reference(record, reference_mv);
+    CHECK_EQ(core::read_reference(record), reference_mv);
+  }
+}
