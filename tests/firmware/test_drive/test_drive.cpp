@@ -414,3 +414,57 @@ TEST_CASE("1000 engagements in a row with 1 ms of bounce never trip it") {
     bench.now_us += uint32_t{1000} * bench.random.below(400);
   }
 }
+
+TEST_CASE("the relay's times to the microsecond, and the numbers of its event") {
+  CHECK_EQ(static_cast<uint8_t>(RelayFault::kNeverEngaged), 0);
+  CHECK_EQ(static_cast<uint8_t>(RelayFault::kOpened), 1);
+  const uint32_t starts_us[] = {5000000, 0xFFFFFFFFU - 30000U};  // over the wrap too
+  for (const uint32_t start_us : starts_us) {
+    core::RelayWatch never;
+    for (uint32_t t_us = 0; t_us <= 45000; t_us += 9000) {
+      CHECK(never.look(false, start_us + t_us) == RelayFault::kNone);
+    }
+    CHECK(never.look(false, start_us + 49999) == RelayFault::kNone);
+    CHECK(never.look(false, start_us + 50000) == RelayFault::kNeverEngaged);
+    core::RelayWatch opened;
+    CHECK(opened.look(true, start_us) == RelayFault::kNone);
+    CHECK(opened.look(false, start_us + 1000) == RelayFault::kNone);
+    CHECK(opened.look(false, start_us + 11000) == RelayFault::kNone);  // 10 ms: not blind yet
+    CHECK(opened.look(false, start_us + 20999) == RelayFault::kNone);
+    CHECK(opened.look(false, start_us + 21000) == RelayFault::kOpened);
+    core::RelayWatch blind;
+    CHECK(blind.look(true, start_us) == RelayFault::kNone);
+    CHECK(blind.look(false, start_us + 1000) == RelayFault::kNone);
+    CHECK(blind.look(false, start_us + 11001) == RelayFault::kNone);  // a microsecond more: blind
+    CHECK(blind.look(false, start_us + 21001) == RelayFault::kNone);
+    CHECK(blind.look(false, start_us + 31000) == RelayFault::kNone);
+    CHECK(blind.look(false, start_us + 31001) == RelayFault::kOpened);
+    // Closed once, it is open from the next look on anew.
+    core::RelayWatch bounced;
+    bounced.look(true, start_us);
+    bounced.look(false, start_us + 1000);
+    bounced.look(false, start_us + 10000);
+    CHECK(bounced.look(true, start_us + 19000) == RelayFault::kNone);
+    CHECK(bounced.look(false, start_us + 20000) == RelayFault::kNone);
+    CHECK(bounced.look(false, start_us + 30000) == RelayFault::kNone);
+    CHECK(bounced.look(false, start_us + 39999) == RelayFault::kNone);
+    CHECK(bounced.look(false, start_us + 40000) == RelayFault::kOpened);
+    // A rest ends the watch: the next look is at a first edge again.
+    bounced.rest();
+    CHECK(bounced.look(false, start_us + 41000) == RelayFault::kNone);
+    for (uint32_t t_us = 50000; t_us <= 90000; t_us += 10000) {
+      CHECK(bounced.look(false, start_us + t_us) == RelayFault::kNone);
+    }
+    CHECK(bounced.look(false, start_us + 90999) == RelayFault::kNone);
+    CHECK(bounced.look(false, start_us + 91000) == RelayFault::kNeverEngaged);
+  }
+  // The first look of a flight has nothing before it, whatever the clock says.
+  for (uint32_t first_us = 0; first_us < 4; ++first_us) {
+    core::RelayWatch watch;
+    CHECK(watch.look(true, first_us) == RelayFault::kNone);
+    CHECK(watch.look(false, first_us + 1) == RelayFault::kNone);
+    CHECK(watch.look(false, first_us + 10001) == RelayFault::kNone);
+    CHECK(watch.look(false, first_us + 20000) == RelayFault::kNone);
+    CHECK(watch.look(false, first_us + 20001) == RelayFault::kOpened);
+  }
+}

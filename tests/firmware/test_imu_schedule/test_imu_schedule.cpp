@@ -198,3 +198,29 @@ TEST_CASE("what does not fit a line is left out, and nothing behind it is touche
   CHECK_EQ(room.line.size(), uint8_t{core::TextLine::kLongest});
   CHECK_EQ(room.behind[0], 1);
 }
+
+TEST_CASE("a packet sealed early waits for its time, one sealed a microsecond late does not") {
+  const uint32_t samples_us[] = {50000, 0xFFFFFFFFU - 2900U, 0x7FFFFFFFU - 2900U};
+  for (const uint32_t sample_us : samples_us) {
+    core::PacketSchedule schedule;
+    schedule.sampled(sample_us);
+    for (uint32_t after_us = 0; after_us <= 2740; after_us += 137) {
+      CHECK_EQ(schedule.start_us(sample_us + after_us), sample_us + 3000);
+    }
+    CHECK_EQ(schedule.start_us(sample_us + 2741), sample_us + 3001);
+    CHECK_EQ(schedule.start_us(sample_us + 9000), sample_us + 9260);
+  }
+}
+
+TEST_CASE("the other bus: behind a second and a microsecond, each time anew") {
+  core::SensorWatch watch;
+  const uint32_t start_us = 0xFFFFFFFFU - 500000U;
+  watch.start(start_us);
+  CHECK(!watch.other_bus_due(start_us + 1));
+  CHECK(!watch.other_bus_due(start_us + 999999));
+  CHECK(!watch.other_bus_due(start_us + 1000000));
+  CHECK(watch.other_bus_due(start_us + 1000001));
+  CHECK(!watch.other_bus_due(start_us + 2000001));
+  CHECK(watch.other_bus_due(start_us + 2000002));
+  CHECK(watch.other_bus_due(start_us + 9000000));
+}
