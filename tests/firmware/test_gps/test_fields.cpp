@@ -352,11 +352,11 @@ TEST_CASE("the time of a file: the calendar's own, 18 s behind GPS, in steps of 
   CHECK_EQ(core::fat_time(frames::kGpsWeekInvalid, 0), 0U);
   CHECK_EQ(core::fat_time(2000, kWeekMs), 0U);
   CHECK(core::fat_time(2000, kWeekMs - 1) != 0U);
-  // Every day at another second, from week 2000 on (2018-05-06).
+  // Days at another second each, from week 2000 (2018-05-06) to 2103; 2100 is no leap year.
   uint16_t year = 2018;
   uint8_t month = 5;
   uint8_t day = 6;
-  for (uint16_t number = 0; number < 5000; ++number) {
+  for (uint16_t number = 0; number < 31000; ++number) {
     const uint32_t second = (number * 7919U) % 86400U;
     uint32_t of_week = (number % 7) * 86400U + second + 18;
     uint16_t week = static_cast<uint16_t>(2000 + number / 7);
@@ -366,7 +366,9 @@ TEST_CASE("the time of a file: the calendar's own, 18 s behind GPS, in steps of 
     }
     const uint32_t date = (year - 1980U) << 9 | static_cast<uint32_t>(month) << 5 | day;
     const uint32_t time = second / 3600 << 11 | second / 60 % 60 << 5 | second % 60 / 2;
-    CHECK_EQ(core::fat_time(week, of_week * 1000 + number % 1000), date << 16 | time);
+    if (number % 61 == 0 || day == 29 || (month == 3 && day == 1)) {
+      CHECK_EQ(core::fat_time(week, of_week * 1000 + number % 1000), date << 16 | time);
+    }
     const uint8_t lengths[] = {31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
     if (++day > lengths[month - 1] + (month == 2 && leap(year) ? 1 : 0)) {
       day = 1;

@@ -154,12 +154,11 @@ class Wire {
     ++bauds;
   }
   bool send(const uint8_t* sent, uint8_t size) {
-    REQUIRE(size == 1);
-    if (room == 0) {
+    CHECK_EQ(size, 1);
+    if (room == 0 || count == sizeof(bytes)) {
       return false;
     }
     --room;
-    REQUIRE(count < sizeof(bytes));
     bytes[count++] = *sent;
     return true;
   }
