@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import re
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+OUTPUT_OF_AUTOPILOT = re.compile(r"\d+=[-A-Za-z]*")
 
 
 def add_log_arguments(parser: argparse.ArgumentParser) -> None:
@@ -55,6 +60,36 @@ def add_sensor(parser: argparse.ArgumentParser) -> None:
     )
 
 
+class StoreOutput(argparse.Action):
+    """Append ``2=elevator`` to the outputs of an autopilot; anything else is the file to write."""
+
+    def __call__(
+        self, parser: Any, namespace: Any, values: Any, option_string: str | None = None
+    ) -> None:
+        """Store one value."""
+        if OUTPUT_OF_AUTOPILOT.fullmatch(values):
+            namespace.outputs = [*namespace.outputs, values]
+        elif self.const is None:
+            raise argparse.ArgumentError(self, f"{values}: expected N=SURFACE, as 2=elevator")
+        else:
+            setattr(namespace, self.dest, self.const(values))
+
+
+def add_output(
+    parser: argparse.ArgumentParser,
+    about: str = "",
+    metavar: str = "",
+    kind: Callable[[str], Any] | None = None,
+) -> None:
+    """Add ``--output N=SURFACE``, and of a verb that writes a file what is to be written."""
+    names = ("-o", "--output") if kind else ("--output",)
+    also = f"{about}; or N=SURFACE: " if about else ""
+    parser.set_defaults(outputs=[])
+    parser.add_argument(*names, action=StoreOutput, const=kind, metavar=metavar or "N=SURFACE",
+                        help=f"{also}of an autopilot's log, output N moves this surface, as"
+                        " 2=elevator, 2=-elevator turned round; repeatable")  # fmt: skip
+
+
 def add_row_rate(parser: argparse.ArgumentParser) -> None:
     """Add the rate of rows without time."""
     parser.add_argument(
@@ -76,6 +111,7 @@ def add_data_choices(parser: argparse.ArgumentParser) -> None:
                         " shows them); repeatable")  # fmt: skip
     add_row_rate(parser)
     add_sensor(parser)
+    add_output(parser)
 
 
 def hexadecimal(text: str) -> int:

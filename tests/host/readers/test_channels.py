@@ -9,7 +9,7 @@ import pytest
 from host.errors import UsageError
 from host.readers.ardupilot_channels import ardupilot_channels
 from host.readers.ardupilot_outputs import surfaces
-from host.readers.autopilot_flight import chosen_sensors, read_autopilot
+from host.readers.autopilot_flight import log_choices, read_autopilot
 from host.readers.autopilot_log import AutopilotLog, Messages
 from host.readers.dataflash_binary import read_records
 from host.readers.flown_tests import flown_tests
@@ -156,10 +156,10 @@ def test_times_that_cannot_be() -> None:
 
 
 def test_another_instance_is_chosen_by_name() -> None:
-    assert chosen_sensors(["IMU=1", "ARSP=0"]) == {"IMU": 1, "ARSP": 0}
+    assert log_choices(["IMU=1", "ARSP=0"]) == {"IMU": 1, "ARSP": 0}
     for word in ("IMU", "IMU=x", "=1"):
         with pytest.raises(UsageError, match="expected MESSAGE=N"):
-            chosen_sensors([word])
+            log_choices([word])
 
 
 PINS = {

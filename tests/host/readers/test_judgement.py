@@ -74,7 +74,7 @@ def px4(tmp_path_factory: pytest.TempPathFactory) -> AutopilotLog:
 def test_outputs_at_10_hz_name_the_parameter(px4: AutopilotLog) -> None:
     messages = {**px4.messages, "actuator_servos": slower(px4.messages["actuator_servos"][0], 20)}
     bad = judged(replace(px4, messages=messages, parameters={**px4.parameters, "SDLOG_PROFILE": 1}))
-    assert "surfaces fast enough" in bad.refusal
+    assert "comes at 10 Hz, 20 are needed (surfaces). Mend it so: SDLOG_PROFILE = 17" in bad.refusal
     assert any("SDLOG_PROFILE = 17 (it is 1)" in one for one in bad.settings)
     assert judged(px4).settings == []
     assert judged(px4).refusal == ""

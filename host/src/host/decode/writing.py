@@ -31,7 +31,7 @@ class Request:
     file_id: int | None = None
     calibration: Path | None = None
     row_rate_hz: float | None = None
-    sensors: tuple[tuple[str, int], ...] = ()
+    sensors: tuple[tuple[str, int | str], ...] = ()
 
 
 def destination(request: Request, source: Path) -> tuple[str, Path]:

@@ -12,7 +12,7 @@ import numpy as np
 from host.arrays import Array, BoolArray
 from host.constants import RAD_PER_DEG
 from host.physical.airdata import KELVIN, density_kgpm3
-from host.readers.ardupilot_outputs import moves_a_surface, surfaces
+from host.readers.ardupilot_outputs import SURFACES, moves_a_surface, surfaces, unknown_outputs
 from host.readers.autopilot_log import AutopilotLog, Messages
 from host.readers.named_channels import (
     STANDARD_DENSITY_KGPM3,
@@ -170,8 +170,9 @@ def _outputs(log: AutopilotLog, found: Channels) -> None:
             "surfaces by SERVOn_ parameters: "
             + "; ".join(f"{name} of {how}" for name, how in made.made_of.items())
         )
-    else:
-        found.notes.append("no SERVOn_FUNCTION in the log names a surface: outputs have no meaning")
+    if not SURFACES & made.shares.keys():
+        numbers = {int(f[1:]) for f in out.fields if f[:1] == "C" and f[1:].isdigit()}
+        found.unknown_outputs = unknown_outputs(numbers, log.parameters)
 
 
 def _moves(messages: Messages, parameters: Mapping[str, float]) -> list[tuple[str, int]]:

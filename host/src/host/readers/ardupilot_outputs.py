@@ -8,7 +8,8 @@ rudder, right = elevator - rudder; flaperon left = aileron + flap, right = ailer
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,9 @@ AILERON, ELEVATOR, RUDDER, THROTTLE = 4, 19, 21, 70
 FLAPERON_LEFT, FLAPERON_RIGHT = 24, 25
 THROTTLE_LEFT, THROTTLE_RIGHT = 73, 74
 ELEVON_LEFT, ELEVON_RIGHT, VTAIL_LEFT, VTAIL_RIGHT = 77, 78, 79, 80
-# Releases before 3.9 have no SERVOn_: RCn_ of the first four by RCMAP.
+SURFACES = {"elevator", "aileron", "rudder"}
+PASSED = 1  # RCPassThru
+RECEIVED = (*range(51, 67), *range(140, 156))  # RCIN1 to 16, and scaled
 DEFAULTS = {"MIN": 1100.0, "MAX": 1900.0, "TRIM": 1500.0, "REVERSED": 0.0}
 SURFACE_FUNCTIONS = {
     AILERON: "aileron", ELEVATOR: "elevator", RUDDER: "rudder", THROTTLE: "throttle",
@@ -46,7 +49,39 @@ class Outputs:
 
 def moves_a_surface(number: int, parameters: Mapping[str, float]) -> bool:
     """Return whether an output, counted from 1, moves a surface or a motor."""
-    return int(parameters.get(f"SERVO{number}_FUNCTION", 0.0)) in SURFACE_FUNCTIONS
+    return abs(_function(number, parameters)) in SURFACE_FUNCTIONS
+
+
+def unknown_outputs(numbers: Iterable[int], parameters: Mapping[str, float]) -> str:
+    """Return what the parameters say of outputs that move no surface, in words.
+
+    Passed through from the receiver, or set up in the receiver's way, as before release 3.9.
+    """
+    if not any(re.fullmatch(r"(SERVO|RC)\d+_.*", name) for name in parameters):
+        return "no SERVOn_FUNCTION in the log"
+    said = []
+    for number in sorted(numbers):
+        function = _function(number, parameters)
+        if function == PASSED:
+            said.append(f"SERVO{number}_FUNCTION = {PASSED} (RCPassThru)")
+        elif function in RECEIVED:
+            said.append(
+                f"SERVO{number}_FUNCTION = {function} (RCIN{RECEIVED.index(function) % 16 + 1})"
+            )
+        elif _own(number, "FUNCTION", parameters) is None and f"RC{number}_MIN" in parameters:
+            said.append(f"no SERVO{number}_FUNCTION (an old release: RC{number}_)")
+    return ", ".join(said) or "no SERVOn_FUNCTION names a surface"
+
+
+def _own(number: int, key: str, parameters: Mapping[str, float]) -> float | None:
+    """Return a parameter of an output: before release 3.9 it was that of the receiver's channel."""
+    found = parameters.get(f"SERVO{number}_{key}")
+    return parameters.get(f"RC{number}_{key}") if found is None else found
+
+
+def _function(number: int, parameters: Mapping[str, float]) -> int:
+    """Return what an output moves; negative where the user says that it is turned round."""
+    return int(_own(number, "FUNCTION", parameters) or 0.0)
 
 
 def surfaces(pulses_us: Mapping[int, Array], parameters: Mapping[str, float]) -> Outputs:
@@ -63,12 +98,13 @@ def surfaces(pulses_us: Mapping[int, Array], parameters: Mapping[str, float]) ->
     pins: dict[int, list[int]] = {}
     clipped: dict[int, int] = {}
     for number, pulse in sorted(pulses_us.items()):
-        function = int(parameters.get(f"SERVO{number}_FUNCTION", 0.0))
+        signed = _function(number, parameters)
+        function = abs(signed)
         if function not in SURFACE_FUNCTIONS:
             continue
         ranged = function in (THROTTLE, THROTTLE_LEFT, THROTTLE_RIGHT)
         demand, ends = _demand(pulse, number, parameters, ranged=ranged)
-        demands.setdefault(function, []).append(demand)
+        demands.setdefault(function, []).append(demand if signed > 0 else -demand)
         pins.setdefault(function, []).append(number)
         clipped[function] = clipped.get(function, 0) + ends
     return _combined(
@@ -82,10 +118,11 @@ def _demand(
     pulse: Array, number: int, parameters: Mapping[str, float], *, ranged: bool
 ) -> tuple[Array, int]:
     """Return the demand of a servo function as a share, and how many samples stood at an end."""
+    own = {key: _own(number, key, parameters) for key in DEFAULTS}
     low, high, trim, turned = (
-        parameters.get(f"SERVO{number}_{key}", DEFAULTS[key])
-        for key in ("MIN", "MAX", "TRIM", "REVERSED")
+        DEFAULTS[key] if value is None else value for key, value in own.items()
     )
+    turned = turned or parameters.get(f"RC{number}_REV", 1.0) < 0.0  # before release 3.9
     width = np.where(pulse > 0.0, pulse, np.nan)
     ends = int(np.sum((width <= low) | (width >= high)))
     if high <= low:

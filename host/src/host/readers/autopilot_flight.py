@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from host.readers.autopilot_log import (
     SensorChoiceError,
 )
 from host.readers.flown_tests import flown_tests
+from host.readers.given_outputs import OUTPUT, with_outputs
 from host.readers.held_outputs import held_output
 from host.readers.judgement import Judgement, judge
 from host.readers.log_formats import format_of_file, read_messages
@@ -165,15 +166,16 @@ def is_autopilot_log(path: Path) -> bool:
 
 
 def read_autopilot(
-    path: Path, sensors: Mapping[str, int] | None = None, flight: int | None = None
+    path: Path, sensors: Mapping[str, int | str] | None = None, flight: int | None = None
 ) -> AutopilotFlight:
     """Read a log of an autopilot.
 
     Parameters
     ----------
     path : Path
-    sensors : mapping of str to int, optional
-        Instance to use of a message, in place of the one with most messages.
+    sensors : mapping of str to int or str, optional
+        Instance to use of a message, in place of the one with most messages; surface that an output
+        moves, as ``{"output 2": "elevator"}``.
     flight : int, optional
         Which flight of it, from 1; that with the longest time in the air without.
 
@@ -181,22 +183,23 @@ def read_autopilot(
     ------
     NotAutopilotLogError
         If it is none, or holds nothing.
-    SensorChoiceError, FlightChoiceError
-        If it has no such instance, or flight.
+    SensorChoiceError, OutputChoiceError, FlightChoiceError
+        If it has no such instance, output, or flight.
     UsageError
         If an extra is missing.
     """
-    logs = read_messages(regular_file(path))
+    chosen, outputs = _apart(sensors or {})
+    logs = [with_outputs(log, outputs) for log in read_messages(regular_file(path))]
     if flight is not None and not 1 <= flight <= len(logs):
         raise FlightChoiceError(f"{path}: no flight {flight}; it has 1 to {len(logs)}")
     if len(logs) == 1:
-        return _flight(logs[0], dict(sensors or {}))
+        return _flight(logs[0], chosen)
     every = [_flight(log, {}) for log in logs]
     best = max(range(len(every)), key=lambda k: every[k].flown.time_s)
-    chosen = best if flight is None else flight - 1
-    found = _flight(logs[chosen], dict(sensors)) if sensors else every[chosen]
-    listed = tuple(_line(number, one) for number, one in enumerate(every, start=1))
-    return replace(found, number=chosen + 1, listed=listed)
+    number = best if flight is None else flight - 1
+    found = _flight(logs[number], chosen) if chosen else every[number]
+    listed = tuple(_line(k, one) for k, one in enumerate(every, start=1))
+    return replace(found, number=number + 1, listed=listed)
 
 
 def _flight(log: AutopilotLog, sensors: Mapping[str, int]) -> AutopilotFlight:
@@ -222,18 +225,31 @@ def _channels(log: AutopilotLog, sensors: Mapping[str, int]) -> tuple[Channels, 
     return ardupilot_channels(log, sensors), []
 
 
-def chosen_sensors(given: list[str]) -> dict[str, int]:
-    """Return instances by message from words such as ``IMU=1``.
+def log_choices(sensors: Iterable[str], outputs: Iterable[str] = ()) -> dict[str, int | str]:
+    """Return what is chosen of a log from words such as ``IMU=1``, and ``2=elevator`` of outputs.
 
     Raises
     ------
     SensorChoiceError
         If one is something else.
     """
-    found = {}
-    for word in given:
+    found: dict[str, int | str] = {}
+    for word in sensors:
         name, _, number = word.partition("=")
         if not name or not number.isdigit():
             raise SensorChoiceError(f"--sensor {word}: expected MESSAGE=N, such as IMU=1")
         found[name] = int(number)
+    for word in outputs:
+        number, _, surface = word.partition("=")
+        found[f"{OUTPUT}{int(number)}"] = surface
     return found
+
+
+def _apart(choices: Mapping[str, int | str]) -> tuple[dict[str, int], dict[int, str]]:
+    """Return the choices among sensors by message, and the surfaces by output."""
+    outputs = {
+        int(name.removeprefix(OUTPUT)): str(what)
+        for name, what in choices.items()
+        if name.startswith(OUTPUT)
+    }
+    return {k: int(v) for k, v in choices.items() if not k.startswith(OUTPUT)}, outputs

@@ -28,6 +28,10 @@ class SensorChoiceError(UsageError):
     """An instance that the log does not have."""
 
 
+class OutputChoiceError(UsageError):
+    """An output that the log does not have, or a surface that nobody has."""
+
+
 class FlightChoiceError(UsageError):
     """A flight that the log does not have."""
 

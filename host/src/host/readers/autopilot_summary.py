@@ -63,6 +63,7 @@ def summary_lines(summary: dict[str, Any]) -> list[str]:
     refusal = summary["judgement"]["refusal"]
     if refusal:
         out.append(f"{'identify':<13}{refusal}")
+        out += [f"{'':<13}next flight: {one}" for one in summary["judgement"]["settings"]]
     else:
         out += [f"{'identify':<13}{line}" for line in summary["table"]]
     return out

@@ -11,7 +11,7 @@ from host.readers.foreign_tables import Foreign
 
 
 def autopilot_table(
-    source: Path, sensors: Mapping[str, int] | None, flight: int | None = None
+    source: Path, sensors: Mapping[str, int | str] | None, flight: int | None = None
 ) -> Foreign:
     """Return the columns of a log of PX4 or ArduPilot.
 

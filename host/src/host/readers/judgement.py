@@ -10,6 +10,7 @@ from host.readers.airborne import Airborne
 from host.readers.autopilot_log import FORMATS, AutopilotLog
 from host.readers.logging_advice import advice
 from host.readers.named_channels import Channels
+from host.terminal import command_line
 
 WINGED = ("", "plane", "vtol")
 # Rates in Hz from which a channel serves: below the first it does not, below the second poorly.
@@ -24,6 +25,17 @@ GROUPS = {
     "attitude": ("phi_rad", "theta_rad", "psi_rad"),
     "surfaces": ("elevator", "aileron", "rudder"),
     "airspeed": ("airspeed_mps",),
+}
+# Records of each format from which a group comes.
+_DATAFLASH: dict[str, tuple[str, ...]] = {"rates": ("IMU",), "surfaces": ("RCOU",)}
+RECORDS: dict[str, dict[str, tuple[str, ...]]] = {
+    "dataflash": _DATAFLASH,
+    "dataflash-text": _DATAFLASH,
+    "ulog": {
+        "rates": ("vehicle_angular_velocity", "sensor_combined"),
+        "surfaces": ("actuator_servos", "actuator_outputs", "vehicle_torque_setpoint"),
+    },
+    "tlog": {"rates": ("ATTITUDE", "RAW_IMU"), "surfaces": ("SERVO_OUTPUT_RAW",)},
 }
 # Groups of derivatives, and the channels that each needs.
 ANSWERS: tuple[tuple[str, tuple[str, ...]], ...] = (
@@ -85,11 +97,14 @@ def judge(log: AutopilotLog, found: Channels, flown: Airborne) -> Judgement:
     lines = [_vehicle_line(log, flown)]
     lines += [f"{group}: {_rate_words(names, rates)}" for group, names in GROUPS.items()]
     lines += _trouble(found, log)
+    option = given_outputs(log, found)
+    slow = [group for group in missing if group != "surfaces" or not option]
+    settings = [*option, *advice(log, slow, poor)]
     return Judgement(
-        refusal=_refusal(log, flown, missing),
+        refusal=_refusal(log, found, flown, missing, rates, settings),
         lines=lines,
         answers=[(what, _verdict(needs, rates, poor)) for what, needs in ANSWERS],
-        settings=advice(log, missing, poor),
+        settings=settings,
         rates_hz=rates,
     )
 
@@ -124,7 +139,39 @@ def _vehicle_line(log: AutopilotLog, flown: Airborne) -> str:
     )
 
 
-def _refusal(log: AutopilotLog, flown: Airborne, missing: Sequence[str]) -> str:
+def given_outputs(log: AutopilotLog, found: Channels) -> list[str]:
+    """Return the option that says what the outputs move, where the log does not."""
+    if not found.unknown_outputs:
+        return []
+    plain = log.autopilot == "ardupilot" and log.vehicle != "vtol"
+    example = "1=aileron --output 2=elevator --output 4=rudder" if plain else "2=elevator"
+    return [
+        f"--output {example}, the numbers and surfaces as yours are connected (a minus before the"
+        " surface turns it round)"
+    ]
+
+
+def _gone(group: str, log: AutopilotLog, found: Channels, rates: Mapping[str, float]) -> str:
+    """Return what of a group of channels the log does not have, by its own word."""
+    words = " or ".join(RECORDS[log.format][group])
+    best = max((rates[name] for name in GROUPS[group] if name in rates), default=0.0)
+    if best:
+        return f"{words} comes at {best:g} Hz, {WANTED_HZ[group][0]:g} are needed ({group})"
+    if group == "surfaces" and found.unknown_outputs:
+        return f"{found.unknown_outputs}: no output is known to move a surface"
+    if any(name in log.messages for name in RECORDS[log.format][group]):
+        return f"nothing of {words} is usable ({group})"
+    return f"there is no {words} in it ({group})"
+
+
+def _refusal(
+    log: AutopilotLog,
+    found: Channels,
+    flown: Airborne,
+    missing: Sequence[str],
+    rates: Mapping[str, float],
+    settings: Sequence[str],
+) -> str:
     where = f"{log.path}: {FORMATS[log.format]}"
     if log.vehicle == "tailsitter":
         return (
@@ -142,13 +189,13 @@ def _refusal(log: AutopilotLog, flown: Airborne, missing: Sequence[str]) -> str:
             f"{where} of a {kind} that never flew ({flown.by} at most {flown.fastest_mps:.1f} m/s):"
             " nothing of it can be identified"
         )
-    if "rates" in missing or "surfaces" in missing:
-        which = " and ".join(g for g in ("rates", "surfaces") if g in missing)
+    gone = [_gone(group, log, found, rates) for group in ("rates", "surfaces") if group in missing]
+    if gone:
+        mend = settings[0] if settings else f"`{command_line('host', 'info', log.path)}` says more"
         return (
-            f"{where} of a {kind} without body {which} fast enough (at least"
-            f" {WANTED_HZ['rates'][0]:g} Hz): nothing of it can be identified; `host info` says"
-            " which parameter to change"
-        ).replace("body surfaces", "surfaces")
+            f"{where} of a {kind} from which nothing can be identified: {'; '.join(gone)}. Mend it"
+            f" so: {mend}"
+        )
     return ""
 
 

@@ -13,7 +13,13 @@ import numpy as np
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.physical.airdata import KELVIN, density_kgpm3
-from host.readers.ardupilot_outputs import Outputs, moves_a_surface, surfaces
+from host.readers.ardupilot_outputs import (
+    SURFACES,
+    Outputs,
+    moves_a_surface,
+    surfaces,
+    unknown_outputs,
+)
 from host.readers.autopilot_log import AutopilotLog, Messages
 from host.readers.named_channels import STANDARD_DENSITY_KGPM3, Channels, instance_of, numbers
 from host.readers.px4_outputs import surfaces_of_pulses
@@ -103,13 +109,17 @@ def _outputs(log: AutopilotLog, found: Channels) -> None:
     for name, share in made.shares.items():
         found.add(name, out.t_s, share, made.made_of[name])
     found.clipped |= {name: many for name, many in made.clipped.items() if many}
-    said = "; ".join(f"{name} of {how}" for name, how in made.made_of.items())
-    found.notes.append(
-        f"surfaces by {by} parameters: {said}"
-        if said
-        else "no SERVOn_FUNCTION came over the radio: outputs have no meaning; fetch the parameters"
-        " in the ground station while it records"
-    )
+    if made.made_of:
+        said = "; ".join(f"{name} of {how}" for name, how in made.made_of.items())
+        found.notes.append(f"surfaces by {by} parameters: {said}")
+    if SURFACES & made.shares.keys():
+        return
+    if log.autopilot == "px4":
+        found.unknown_outputs = "no CA_SV_CSn_TYPE with a PWM_MAIN_FUNCn for it came over the radio"
+    elif not log.parameters:
+        found.unknown_outputs = "no SERVOn_FUNCTION came over the radio"
+    else:
+        found.unknown_outputs = unknown_outputs(pulses, log.parameters)
 
 
 def _surfaces(log: AutopilotLog, t_s: Array, pulses: Mapping[int, Array]) -> tuple[Outputs, str]:

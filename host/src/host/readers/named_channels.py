@@ -38,6 +38,8 @@ class Channels:
         By our name with unit; surfaces without ``_rad``: they are shares of full travel.
     notes : list of str
         Lines on chosen sensors and on outputs that became surfaces.
+    unknown_outputs : str
+        What the log says of outputs that move no surface, where none moves one; empty else.
     clipped : dict of str to int
         Of a surface or an IMU, samples at the end of its range.
     output_period_s : float
@@ -48,6 +50,7 @@ class Channels:
 
     signals: dict[str, Signal] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    unknown_outputs: str = ""
     clipped: dict[str, int] = field(default_factory=dict)
     output_period_s: float = 0.02
     vibration_mps2: float = float("nan")

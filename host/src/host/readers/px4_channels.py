@@ -288,6 +288,8 @@ def _outputs(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> N
             + "; ".join(f"{name} of {how}" for name, how in out.made_of.items())
             + "; what a servo's pulse adds to it (up to 20 ms) is not in the log"
         )
+    elif "actuator_servos" in log.messages or "actuator_outputs" in log.messages:
+        found.unknown_outputs = "no CA_SV_CSn_TYPE in the log is of a surface"
     _throttle(log, chosen, found)
 
 

@@ -37,9 +37,10 @@ def allocated_surfaces(controls: Mapping[int, Array], parameters: Mapping[str, f
     by_type: dict[str, list[Array]] = {}
     count = int(parameters.get("CA_SV_CS_COUNT", MOST_SURFACES))
     for k in range(min(count, MOST_SURFACES)):
-        kind = TYPES.get(int(parameters.get(f"CA_SV_CS{k}_TYPE", 0)))
+        signed = int(parameters.get(f"CA_SV_CS{k}_TYPE", 0))  # negative: the user turns it round
+        kind = TYPES.get(abs(signed))
         if kind and k in controls:
-            by_type.setdefault(kind, []).append(controls[k])
+            by_type.setdefault(kind, []).append(controls[k] if signed > 0 else -controls[k])
     value = {kind: np.mean(every, axis=0) for kind, every in by_type.items()}
     shares: dict[str, Array] = {}
     made_of: dict[str, str] = {}

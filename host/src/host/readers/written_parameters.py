@@ -49,6 +49,13 @@ class Parameters(dict[str, float]):
             self[name] = every[longest][1]
         self.changes = {name: every for name, every in self.changes.items() if len(every) > 1}
 
+    def replaced(self, values: Mapping[str, float]) -> Parameters:
+        """Return them with these values all the time."""
+        found = Parameters()
+        found.update({**self, **values})
+        found.changes = {k: own for k, own in self.changes.items() if k not in values}
+        return found
+
     def lines(self) -> list[str]:
         """Return a line on each parameter of an output that changed."""
         return [

@@ -56,7 +56,7 @@ class FlightRequest:
     file_id: int | None = None
     calibration: Path | None = None
     row_rate_hz: float | None = None
-    sensors: tuple[tuple[str, int], ...] = ()
+    sensors: tuple[tuple[str, int | str], ...] = ()
     maneuvers: bool = True  # whether test points are looked for
 
 

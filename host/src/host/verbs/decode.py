@@ -8,7 +8,7 @@ import sys
 from typing import Any
 
 from host.decode.newest_flight import source_or_newest
-from host.source_arguments import add_log_arguments
+from host.source_arguments import add_log_arguments, add_output
 
 _DESCRIPTION = """\
 Decode a flight log: print what it holds and how good it is, write the synchronous
@@ -32,12 +32,8 @@ def add_parser(subparsers: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_log_arguments(parser)
-    parser.add_argument(
-        "-o",
-        "--output",
-        metavar="PATH",
-        help="file or folder to write; - for stdout (csv); the working folder without it",
-    )
+    add_output(parser, "file or folder to write; - for stdout (csv); the working folder without it",
+               "PATH", str)  # fmt: skip
     parser.add_argument(
         "--to",
         choices=("csv", "parquet", "mat", "npz"),
@@ -56,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     """Decode, print, write; return the exit code."""
     from host.decode.decoding import decode
     from host.decode.writing import Request
-    from host.readers.autopilot_flight import chosen_sensors
+    from host.readers.autopilot_flight import log_choices
     from host.text import shown
 
     request = Request(
@@ -68,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
         file_id=args.file_id,
         calibration=args.calibration,
         row_rate_hz=args.row_rate,
-        sensors=tuple(chosen_sensors(args.sensor).items()),
+        sensors=tuple(log_choices(args.sensor, args.outputs).items()),
     )
     result = decode(request)
     out = sys.stderr if args.output == "-" else sys.stdout

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from host.source_arguments import add_log_arguments
+from host.source_arguments import add_log_arguments, add_output
 from host.verbs.plot import flight_request
 
 _KINDS = ("tlog", "ulog", "kml", "kmz", "gpx", "mcap")
@@ -32,8 +32,7 @@ def add_parser(subparsers: Any) -> None:
     add_log_arguments(parser)
     parser.add_argument("--to", choices=_KINDS, action="append", required=True,
                         help="format; repeatable")  # fmt: skip
-    parser.add_argument("-o", "--output", type=Path, metavar="PATH",
-                        help="file or folder to write; the working folder without it")  # fmt: skip
+    add_output(parser, "file or folder to write; the working folder without it", "PATH", Path)
     parser.add_argument(
         "--rate", type=float, metavar="HZ", help="rows a second of tlog (default 25)"
     )

@@ -126,7 +126,7 @@ def _run(args: argparse.Namespace) -> int:
     """Identify and print the answer: words first, then numbers."""
     from host.aircraft.origin import announce_aircraft
     from host.errors import ExitCode
-    from host.readers.autopilot_flight import chosen_sensors
+    from host.readers.autopilot_flight import log_choices
     from host.sysid.answer import check_outputs
     from host.sysid.estimators import read_options
     from host.sysid.flight import chosen_flights
@@ -155,7 +155,7 @@ def _run(args: argparse.Namespace) -> int:
         stretches=of_each_flight(stretches_of_each(args.ends, files), flights),
         corrections=not args.no_corrections,
         accept=args.accept or (),
-        sensors=chosen_sensors(args.sensor),
+        sensors=log_choices(args.sensor, args.outputs),
         row_rate_hz=args.row_rate,
         delays=not args.no_delays,
         truth=[path for _, path in args.truth],

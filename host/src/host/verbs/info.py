@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from host.decode.newest_flight import source_or_newest
-from host.source_arguments import add_flight, add_sensor
+from host.source_arguments import add_flight, add_output, add_sensor
 
 
 def add_parser(subparsers: Any) -> None:
@@ -28,6 +29,7 @@ def add_parser(subparsers: Any) -> None:
         " working folder without it",
     )
     add_sensor(parser)
+    add_output(parser)
     add_flight(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
 
@@ -37,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     from host.errors import ExitCode
     from host.log.head import describe, describe_folder, head_lines
     from host.log.source import check_source
-    from host.readers.autopilot_flight import chosen_sensors, is_autopilot_log, read_autopilot
+    from host.readers.autopilot_flight import is_autopilot_log, log_choices, read_autopilot
     from host.readers.autopilot_summary import summarise_autopilot, summary_lines
     from host.text import shown
 
@@ -49,10 +51,11 @@ def run(args: argparse.Namespace) -> int:
         )
         return int(ExitCode.OK)
     if is_autopilot_log(source):
-        flight = read_autopilot(source, chosen_sensors(args.sensor), args.flight)
+        choices = log_choices(args.sensor, args.outputs)
+        flight = read_autopilot(source, choices, args.flight)
         summary = summarise_autopilot(flight)
         for one in summary["flights"]:
-            one["maneuvers"] = _maneuvers(source, one["number"])
+            one["maneuvers"] = _maneuvers(source, one["number"], choices)
         print(
             json.dumps(summary, indent=2)
             if args.json
@@ -64,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     return int(ExitCode.OK)
 
 
-def _maneuvers(source: Path, number: int) -> int | None:
+def _maneuvers(source: Path, number: int, choices: Mapping[str, int | str]) -> int | None:
     """Return how many test points a flight of a log has; None if nothing can be said of it."""
     from host.errors import HostError
     from host.readers.flight_choice import with_flight
@@ -72,7 +75,7 @@ def _maneuvers(source: Path, number: int) -> int | None:
     from host.sysid.maneuvers import detect_maneuvers
 
     try:
-        columns, _ = read_columns(with_flight(source, number))
+        columns, _ = read_columns(with_flight(source, number), sensors=choices)
     except HostError:
         return None
     return len(detect_maneuvers(columns))

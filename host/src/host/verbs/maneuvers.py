@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from host.decode.newest_flight import source_or_newest
-from host.source_arguments import add_flight, add_row_rate, add_sensor
+from host.source_arguments import add_flight, add_output, add_row_rate, add_sensor
 
 
 def add_parser(subparsers: Any) -> None:
@@ -28,6 +28,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--calibration", type=Path, metavar="TOML", help="calibration of a log")
     add_row_rate(parser)
     add_sensor(parser)
+    add_output(parser)
     add_flight(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
 
@@ -37,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     # The matrices are small: threads of BLAS only wait for each other (28 s against 5 measured).
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.errors import ExitCode, IdentificationError
-    from host.readers.autopilot_flight import chosen_sensors
+    from host.readers.autopilot_flight import log_choices
     from host.readers.flight_choice import with_flight
     from host.readers.shipped_maps import LIST, map_lines
     from host.sysid.answer import json_text
@@ -53,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         source = with_flight(source_or_newest(args.source), args.flight)
         columns, notes = read_columns(source, args.map, calibration=args.calibration,
-                                      sensors=chosen_sensors(args.sensor),
+                                      sensors=log_choices(args.sensor, args.outputs),
                                       row_rate_hz=args.row_rate)  # fmt: skip
     except IdentificationError as error:
         raise IdentificationError(option_words(str(error))) from error

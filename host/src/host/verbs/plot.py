@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from host.decode.newest_flight import source_or_newest
-from host.source_arguments import add_log_arguments
+from host.source_arguments import add_log_arguments, add_output
 
 _DESCRIPTION = """\
 Show a flight: one HTML page that needs no network, with strips in degrees, test points
@@ -32,13 +32,7 @@ def add_parser(subparsers: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_log_arguments(parser)
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        metavar="HTML",
-        help="page to write; <name>.html in the working folder without it",
-    )
+    add_output(parser, "page to write; <name>.html in the working folder without it", "HTML", Path)
     parser.add_argument("--open", action="store_true", help="open the page in the browser")
     parser.add_argument(
         "--full",
@@ -62,7 +56,7 @@ def add_parser(subparsers: Any) -> None:
 
 def flight_request(args: argparse.Namespace) -> Any:
     """Return what `add_log_arguments` was given as `host.report.flight_reading.FlightRequest`."""
-    from host.readers.autopilot_flight import chosen_sensors
+    from host.readers.autopilot_flight import log_choices
     from host.report.flight_reading import FlightRequest
 
     return FlightRequest(
@@ -71,7 +65,7 @@ def flight_request(args: argparse.Namespace) -> Any:
         file_id=args.file_id,
         calibration=args.calibration,
         row_rate_hz=args.row_rate,
-        sensors=tuple(chosen_sensors(args.sensor).items()),
+        sensors=tuple(log_choices(args.sensor, args.outputs).items()),
     )
 
 

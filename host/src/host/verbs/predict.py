@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.aircraft.origin import announce_aircraft
     from host.errors import ExitCode, IdentificationError, UsageError
-    from host.readers.autopilot_flight import chosen_sensors
+    from host.readers.autopilot_flight import log_choices
     from host.readers.shipped_maps import LIST, map_lines
     from host.sysid.answer import OutputPaths, check_outputs
     from host.sysid.checks.data_finding import check_lines
@@ -95,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
             stretches=of_each_flight(stretches, flights),
             corrections=not args.no_corrections,
             accept=args.accept or (),
-            sensors=chosen_sensors(args.sensor),
+            sensors=log_choices(args.sensor, args.outputs),
             row_rate_hz=args.row_rate,
             constants=not args.no_constants,
         )

@@ -10,7 +10,7 @@ from typing import Any
 
 from host.decode.newest_flight import source_or_newest
 from host.placed_arguments import StorePlaced, flattened, of_each, of_each_flight
-from host.source_arguments import add_flight, add_row_rate, add_sensor
+from host.source_arguments import add_flight, add_output, add_row_rate, add_sensor
 
 _DESCRIPTION = """\
 Identify the aircraft from one or several flights, as `host identify` does, and write the
@@ -32,13 +32,8 @@ def add_parser(subparsers: Any) -> None:
         "log (also of PX4, ArduPilot), CSV, Parquet, MAT; several are fitted together;"
         " without one the newest flight of the working folder"
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        metavar="HTML",
-        help="page to write (default: <name>.report.html in the working folder)",
-    )
+    add_output(parser, "page to write (default: <name>.report.html in the working folder)",
+               "HTML", Path)  # fmt: skip
     parser.add_argument(
         "--aircraft",
         metavar="NAME",
@@ -109,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.aircraft.origin import announce_aircraft
     from host.errors import ExitCode, UsageError
-    from host.readers.autopilot_flight import chosen_sensors
+    from host.readers.autopilot_flight import log_choices
     from host.report.reporting import ReportRequest, write_report
     from host.sysid.flight import chosen_flights
     from host.sysid.pipeline.arguments import option_words
@@ -139,7 +134,7 @@ def run(args: argparse.Namespace) -> int:
             "truth": [path for _, path in args.truth],
             "prior": args.prior,
             "row_rate_hz": args.row_rate,
-            "sensors": chosen_sensors(args.sensor),
+            "sensors": log_choices(args.sensor, args.outputs),
             "delays": not args.no_delays,
         },
         command=command_line("host", *sys.argv[1:]),

@@ -74,7 +74,7 @@ def read_columns(
     *,
     calibration: Path | None = None,
     also: Collection[str] = (),
-    sensors: Mapping[str, int] | None = None,
+    sensors: Mapping[str, int | str] | None = None,
     row_rate_hz: float | None = None,
 ) -> tuple[dict[str, Array], list[str]]:
     """Return columns and notes of `read_flight_columns`, whose arguments these are; its findings
@@ -98,7 +98,7 @@ def read_flight_columns(
     calibration: Path | None = None,
     also: Collection[str] = (),
     accept: Collection[str] = (),
-    sensors: Mapping[str, int] | None = None,
+    sensors: Mapping[str, int | str] | None = None,
     row_rate_hz: float | None = None,
 ) -> FlightColumns:
     """Return the columns identification uses, notes about them, and how they were recorded.
@@ -117,7 +117,7 @@ def read_flight_columns(
     accept : collection of str
         Checks whose findings change nothing: the columns are used as they are.
     sensors : mapping of str to int, optional
-        Of an autopilot's log, the instance to use of a message.
+        Of an autopilot's log, the instance to use of a message, the surface that an output moves.
     row_rate_hz : float, optional
         Of original rows, how many a second; estimated from GPS without it.
 
@@ -280,7 +280,7 @@ def _read(
     mapping: Path | None,
     calibration: Path | None,
     wanted: Collection[str],
-    sensors: Mapping[str, int] | None,
+    sensors: Mapping[str, int | str] | None,
     row_rate_hz: float | None = None,
 ) -> tuple[Foreign, bool]:
     """Return the columns of a source, and whether our logger recorded them."""

@@ -105,7 +105,7 @@ def predict(
     to_s: float | None = None,
     corrections: bool = True,
     accept: str | Iterable[str] = (),
-    sensors: Mapping[str, int] | None = None,
+    sensors: Mapping[str, int | str] | None = None,
     row_rate_hz: float | None = None,
     constants: bool = True,
 ) -> Prediction:

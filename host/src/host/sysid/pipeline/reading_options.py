@@ -50,7 +50,7 @@ class ReadingOptions:
     delays: bool = True
     also: tuple[str, ...] = ()
     accept: frozenset[str] = frozenset()
-    sensors: tuple[tuple[str, int], ...] = ()
+    sensors: tuple[tuple[str, int | str], ...] = ()
     row_rate_hz: float | None = None
 
 
@@ -66,7 +66,7 @@ def reading_options(
     delays: bool = True,
     also: tuple[str, ...] = (),
     accept: str | Iterable[str] = (),
-    sensors: Mapping[str, int] | None = None,
+    sensors: Mapping[str, int | str] | None = None,
     row_rate_hz: float | None = None,
 ) -> list[ReadingOptions]:
     """Return the options of each flight; the arguments are those of `host.identify`.

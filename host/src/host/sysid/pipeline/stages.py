@@ -59,7 +59,7 @@ def identify(
     to_s: float | None = None,
     corrections: bool = True,
     accept: str | Iterable[str] = (),
-    sensors: Mapping[str, int] | None = None,
+    sensors: Mapping[str, int | str] | None = None,
     row_rate_hz: float | None = None,
     delays: bool = True,
     truth: str | Path | Sequence[str | Path] | None = None,
@@ -99,7 +99,8 @@ def identify(
     accept : str or several
         Checks of the data whose findings shall change nothing: columns are used as they are.
     sensors : mapping of str to int, optional
-        Of an autopilot's log, the instance to use of a message: ``{"IMU": 1}``.
+        Of an autopilot's log, the instance to use of a message: ``{"IMU": 1}``; and the surface
+        that an output moves: ``{"output 2": "elevator"}``.
     row_rate_hz : float, optional
         Of original ASCII rows, which carry no time; estimated from GPS without it.
     delays : bool
