@@ -23,6 +23,8 @@ from host.physical.columns import COLUMNS, UNITS
 from host.progress import progress_bar
 from host.readers.autopilot_flight import is_autopilot_log, read_autopilot
 from host.readers.autopilot_summary import autopilot_meta, summarise_autopilot, summary_lines
+from host.readers.gzip_file import given_path
+from host.readers.readable_file import readable_file
 from host.terminal import command_line
 from host.text import shown
 
@@ -73,7 +75,7 @@ def decode(request: Request) -> Decoded:
     UsageError, NotALogError, LogError, CalibrationError
         See `host.read_log`.
     """
-    path = pick(check_source(request.source))
+    path = readable_file(pick(check_source(request.source)))
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
     if looks_like_rows(head):
@@ -100,7 +102,7 @@ def decode(request: Request) -> Decoded:
     if request.frames:
         files += write_frames(log, kind, target)
     summary["files"] = files
-    summary["next"] = next_command(files, request, path)
+    summary["next"] = next_command(files, request, given_path(path))
     said = [*lines(summary), *(f"{'wrote':<13}{name}" for name in files)]
     if not summary["rows"]:
         said.append(f"{'wrote':<13}no table: the log holds no identification frame")
@@ -124,9 +126,9 @@ def decode_rows(request: Request, path: Path) -> Decoded:
     summary["files"] = [str(target)]
     rate = ("--row-rate", f"{request.row_rate_hz:g}" if request.row_rate_hz else "HZ")
     summary["next"] = (
-        command_line("host", "maneuvers", path, *(rate if request.row_rate_hz else ()))
+        command_line("host", "maneuvers", given_path(path), *(rate if request.row_rate_hz else ()))
         if table.rate.known
-        else command_line("host", "decode", path, *rate, *_own(request))
+        else command_line("host", "decode", given_path(path), *rate, *_own(request))
     )
     said = [*row_lines(summary), f"{'wrote':<13}{target}", f"{'next':<13}{summary['next']}"]
     return Decoded(summary, said)
@@ -156,7 +158,7 @@ def decode_autopilot(request: Request, path: Path) -> Decoded:
     summary["files"] = [str(target)] if columns else []
     verb = "info" if flight.judgement.refusal else "maneuvers"
     which = () if request.session is None else ("--flight", str(request.session))
-    summary["next"] = command_line("host", verb, path, *which)
+    summary["next"] = command_line("host", verb, given_path(path), *which)
     said = [*summary_lines(summary), *(f"{'wrote':<13}{name}" for name in summary["files"])]
     said.append(f"{'next':<13}{summary['next']}")
     return Decoded(summary, said)

@@ -20,6 +20,7 @@ from host.readers.autopilot_log import (
 )
 from host.readers.flown_tests import flown_tests
 from host.readers.given_outputs import OUTPUT, with_outputs
+from host.readers.gzip_file import given_path
 from host.readers.held_outputs import held_output
 from host.readers.judgement import Judgement, judge
 from host.readers.log_formats import format_of_file, read_messages
@@ -189,7 +190,8 @@ def read_autopilot(
         If an extra is missing.
     """
     chosen, outputs = _apart(sensors or {})
-    logs = [with_outputs(log, outputs) for log in read_messages(regular_file(path))]
+    read = read_messages(regular_file(path))
+    logs = [with_outputs(replace(log, path=given_path(path)), outputs) for log in read]
     if flight is not None and not 1 <= flight <= len(logs):
         raise FlightChoiceError(f"{path}: no flight {flight}; it has 1 to {len(logs)}")
     if len(logs) == 1:

@@ -26,13 +26,6 @@ if TYPE_CHECKING:
 TEXT_KINDS = (".csv", ".tsv", ".txt", ".dat")
 MOST_UNIT_ROWS = 2
 LARGEST = 1e20  # nanoseconds since 1970 are 2e18; a response that diverges is no measurement
-# How files of others begin that end up here, and what to do with them.
-OTHERS = (
-    (b"PK\x03\x04", "a spreadsheet or an archive: save it as CSV, Parquet or MAT"),
-    (b"\xd0\xcf\x11\xe0", "an old spreadsheet: save it as CSV"),
-    (b"\x89HDF", "HDF5: save it as CSV, Parquet or MAT up to version 7"),
-    (b"%PDF", "a PDF: the numbers are needed as CSV"),
-)
 
 
 @dataclass(slots=True)
@@ -74,28 +67,13 @@ def read_foreign(source: Path) -> Foreign:
         raise IdentificationError(f"{source}: the file is empty")
     kind = source.suffix.lower()
     if kind == ".mat":
-        return _mat(source, head)
+        return _mat(source)
     if kind == ".parquet":
         return from_frame(read_parquet(source))
     text = read_text(source, head)
     found = from_frame(text.frame)
     found.notes, found.twice = text.notes, text.twice
     return found
-
-
-def refuse_other(source: Path) -> None:
-    """Refuse what others write and nobody here reads.
-
-    Raises
-    ------
-    IdentificationError
-        With what it is, and how it becomes a table.
-    """
-    with source.open("rb") as file:
-        head = file.read(8)
-    for begin, words in OTHERS:
-        if head.startswith(begin):
-            raise IdentificationError(f"{source}: {words}")
 
 
 def is_text(source: Path) -> bool:
@@ -164,12 +142,7 @@ def _seconds(instants: pd.Series[Any]) -> Array:
     return np.asarray(since.dt.total_seconds().to_numpy(dtype=np.float64, na_value=np.nan))
 
 
-def _mat(source: Path, head: bytes) -> Foreign:
-    if head.startswith(b"MATLAB 7.3") or b"\x89HDF\r\n" in head[:1024]:
-        raise IdentificationError(
-            f"{source}: a MAT file of version 7.3 (HDF5); in MATLAB: s = load('{source.name}');"
-            " save('as7.mat', '-struct', 's', '-v7')"
-        )
+def _mat(source: Path) -> Foreign:
     try:
         leaves = [
             leaf

@@ -26,6 +26,7 @@ from host.readers.autopilot_flight import is_autopilot_log, read_autopilot
 from host.readers.autopilot_summary import autopilot_meta, summarise_autopilot, summary_lines
 from host.readers.even_grid import FITTED, even_arrays
 from host.readers.flight_choice import with_flight
+from host.readers.readable_file import readable_file
 from host.report.gps_position import (
     calibration_values,
     changed_position,
@@ -68,7 +69,7 @@ def read_flight(wanted: FlightRequest) -> tuple[ShownFlight, Path]:
     UsageError, NotALogError, LogError, CalibrationError
         See `host.decode.decoding.decode`.
     """
-    path = pick(check_source(wanted.source))
+    path = readable_file(pick(check_source(wanted.source)))
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
     if looks_like_rows(head):

@@ -15,6 +15,7 @@ from host.preflight.preflight_sheet import sheet_beside, sheet_lines
 from host.readers.autopilot_flight import is_autopilot_log
 from host.readers.flight_choice import file_and_flight
 from host.readers.foreign_tables import TEXT_KINDS
+from host.readers.readable_file import readable_file
 from host.report.flight_reading import FlightRequest, read_flight
 from host.report.plotting import page_file, write_text
 from host.report.provenance import hashes, versions
@@ -116,7 +117,7 @@ def _flight(
     source: Path, calibration: Path | None, options: Mapping[str, Any]
 ) -> ShownFlight | None:
     """Return a log as a flight to show; None for a table, which has no events and losses."""
-    if file_and_flight(source)[0].suffix.lower() in _TABLES:
+    if readable_file(file_and_flight(source)[0]).suffix.lower() in _TABLES:
         return None
     try:
         return read_flight(_flight_request(source, calibration, options))[0]
@@ -130,6 +131,7 @@ def _flight_request(
     source: Path, calibration: Path | None, options: Mapping[str, Any]
 ) -> FlightRequest:
     source, flight = file_and_flight(source)
+    source = readable_file(source)
     if is_autopilot_log(source):
         chosen = tuple(options.get("sensors", {}).items())
         return FlightRequest(source, session=flight, sensors=chosen)

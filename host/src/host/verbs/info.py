@@ -41,6 +41,7 @@ def run(args: argparse.Namespace) -> int:
     from host.log.source import check_source
     from host.readers.autopilot_flight import is_autopilot_log, log_choices, read_autopilot
     from host.readers.autopilot_summary import summarise_autopilot, summary_lines
+    from host.readers.readable_file import readable_file
     from host.text import shown
 
     source = check_source(source_or_newest(args.source))
@@ -50,6 +51,7 @@ def run(args: argparse.Namespace) -> int:
             json.dumps(flights, indent=2) if args.json else "\n".join(map(shown, _table(flights)))
         )
         return int(ExitCode.OK)
+    source = readable_file(source)
     if is_autopilot_log(source):
         choices = log_choices(args.sensor, args.outputs)
         flight = read_autopilot(source, choices, args.flight)

@@ -12,6 +12,7 @@ from host.readers.even_grid import USED
 from host.readers.flight_choice import ALL, with_flight
 from host.readers.foreign_tables import is_text, read_foreign
 from host.readers.original_table import is_original
+from host.readers.readable_file import readable_file
 from host.readers.table_clock import counted_on, flown_s, recordings
 from host.sysid.flight.flight_tables import READ
 
@@ -48,6 +49,7 @@ def chosen_flights(
 
 def _numbers(source: Path, mapping: Path | None) -> list[int]:
     """Return the numbers of the flights of a source; none where it has but one."""
+    source = readable_file(source)
     if not source.is_file() or is_original(source):
         return []
     if is_autopilot_log(source):

@@ -31,10 +31,10 @@ from host.readers.foreign_tables import (
     is_text,
     leave_infinities_out,
     read_foreign,
-    refuse_other,
     same_length,
 )
 from host.readers.original_table import is_original, original_table
+from host.readers.readable_file import readable_file
 from host.readers.recorded import commanded_by_map, recording_of_log, recording_of_table
 from host.readers.table_clock import counted_on, evenly_timed, one_recording
 from host.sysid.checks.data_finding import Finding
@@ -298,7 +298,7 @@ def _read(
             return found, True
     else:
         source, flight = file_and_flight(source)
-        file_or_folder(source, IdentificationError)
+        source = readable_file(file_or_folder(source, IdentificationError))
         if is_autopilot_log(source):
             return autopilot_table(source, sensors, flight), False
         if is_original(source):
@@ -333,8 +333,6 @@ def _recorded(
     """Return the columns of a log; None if it is none but may be a table of text."""
     from host.errors import NotALogError
 
-    if source.is_file():
-        refuse_other(source)
     try:
         return _log(source, calibration, wanted, session)
     except NotALogError:
