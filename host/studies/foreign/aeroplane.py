@@ -16,7 +16,7 @@ from host.constants import GRAVITY_MPS2
 from numpy.typing import NDArray
 from scipy.optimize import fsolve
 
-from studies.foreign.gust_field import Gusts, at
+from studies.foreign.gust_field import GustLists, Gusts, at
 
 DENSITY_KGPM3 = 1.2
 Speed = TypeVar("Speed", float, NDArray[np.float64])
@@ -109,7 +109,7 @@ def motion(
     x: list[float],
     command: tuple[float, float, float],
     throttle: float,
-    air: Gusts,
+    air: Gusts | GustLists,
     *,
     turns: bool,
     spread: bool,
@@ -124,7 +124,7 @@ def motion(
     command : tuple of float
         Of the three servos.
     throttle : float
-    air : Gusts
+    air : Gusts or GustLists
     turns : bool
         Gusts are given in body axes, and so turn with the aircraft; else in earth axes.
     spread : bool

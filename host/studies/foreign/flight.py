@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ from host.constants import GRAVITY_MPS2
 from numpy.typing import NDArray
 
 from studies.foreign.aeroplane import DENSITY_KGPM3, TRAINER, motion, trimmed
-from studies.foreign.gust_field import gusts
+from studies.foreign.gust_field import Gusts, gusts
 
 STEP_S, SUBSTEPS = 0.01, 2
 SPEED_MPS, HEIGHT_M = 18.0, 60.0
@@ -52,6 +53,26 @@ def fly(
     """Return the columns as measured and as they were, each (samples,)."""
     rng = np.random.default_rng(seed)
     field = gusts(rng, air.intensity_mps, air.form, TRAINER.span if air.spread else None)
+    true = _flown(air, field) if air.intensity_mps else dict(_calm(air))
+    measured = {
+        name: values + NOISE.get(name, 0.0) * rng.standard_normal(len(values))
+        for name, values in true.items()
+    }
+    return measured, true
+
+
+@functools.cache
+def _calm(air: Air) -> dict[str, NDArray[np.float64]]:
+    """Return the true columns in air that does not move: the same of every seed, read-only."""
+    true = _flown(air, gusts(np.random.default_rng(0), 0.0, air.form, None))
+    for values in true.values():
+        values.flags.writeable = False
+    return true
+
+
+def _flown(air: Air, gusts_met: Gusts) -> dict[str, NDArray[np.float64]]:
+    """Return the true columns."""
+    field = gusts_met.lists()
     alpha, de, throttle = trimmed(SPEED_MPS)
     x = [SPEED_MPS * np.cos(alpha), 0.0, SPEED_MPS * np.sin(alpha), *[0.0] * 4, alpha, 0.0, 0.0]
     x = [float(value) for value in (*x, HEIGHT_M, *[0.0] * 3, de, 0.0, 0.0)]
@@ -68,8 +89,8 @@ def fly(
 
         now = motion(x, command, throttle, field, turns=air.turns, spread=air.spread)
         rows.append((t, now.airspeed, now.alpha, now.beta, *x[3:9], *now.force, *x[14:17], x[10]))
-        for _ in range(SUBSTEPS):
-            a = rates(x)
+        for substep in range(SUBSTEPS):
+            a = rates(x) if substep else now.rates
             b = rates([s + 0.5 * step * k for s, k in zip(x, a, strict=True)])
             c = rates([s + 0.5 * step * k for s, k in zip(x, b, strict=True)])
             d = rates([s + step * k for s, k in zip(x, c, strict=True)])
@@ -77,12 +98,7 @@ def fly(
                 s + step / 6.0 * (ka + 2.0 * kb + 2.0 * kc + kd)
                 for s, ka, kb, kc, kd in zip(x, a, b, c, d, strict=True)
             ]
-    true = dict(zip(COLUMNS, np.array(rows).T, strict=True))
-    measured = {
-        name: values + NOISE.get(name, 0.0) * rng.standard_normal(len(values))
-        for name, values in true.items()
-    }
-    return measured, true
+    return dict(zip(COLUMNS, np.array(rows).T, strict=True))
 
 
 def derivatives(airspeed_mps: float) -> dict[str, float]:
