@@ -5,12 +5,16 @@ background lets it ignore Ctrl-C, and so its children: those that are to end by 
 The report of a run names the processor time of each case. One that takes more than `MOST_CPU_S`
 of a quiet machine fails, unless it says why it costs more: `@pytest.mark.costs(seconds, "why")`.
 Machines, and one machine with neighbours, differ by `SLOWER`.
+Linear algebra has one thread, before numpy is loaded: the matrices are small, and on a busy machine
+threads that spin for them make a fit ten times slower.
 """
 
 import os
 import signal
 import time
 from collections.abc import Generator
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 from hypothesis import settings

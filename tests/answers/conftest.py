@@ -1,8 +1,4 @@
-"""The tolerance of the comparison, and one thread of linear algebra before numpy is loaded."""
-
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+"""The tolerance of the comparison."""
 
 import pytest
 

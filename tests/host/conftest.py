@@ -1,13 +1,6 @@
-"""One thread of linear algebra per process, before numpy is loaded; one way of running loops.
+"""One way of running loops."""
 
-The matrices here are small: on a busy machine threads that spin for them make a fit ten times
-slower.
-"""
-
-import os
 from collections.abc import Iterator
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 

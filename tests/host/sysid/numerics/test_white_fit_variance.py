@@ -11,6 +11,7 @@ import pytest
 from host.arrays import Array, IntArray
 from host.sysid.numerics.ar_noise import ArNoise
 from host.sysid.numerics.score_variance import _by_innovations, white_fit_variance
+from scipy.signal import lfilter
 
 SAMPLES, DRAWS = 400, 600
 MEMORY = (np.array([0.9]), np.array([1.5, -0.7]))
@@ -43,12 +44,11 @@ class TwoLines:
 def _noise(rng: np.random.Generator, together: float) -> Array:
     both = rng.standard_normal((2, SAMPLES + 200))
     both[1] = together * both[0] + np.sqrt(1.0 - together**2) * both[1]
-    out = np.zeros_like(both)
-    for j, coefficient in enumerate(MEMORY):
-        for t in range(2, both.shape[1]):
-            before = sum(a * out[j, t - k] for k, a in enumerate(coefficient, start=1))
-            out[j, t] = SIZE[j] * both[j, t] + before
-    return out[:, 200:]
+    made = [
+        lfilter([size], [1.0, *-coefficient], row)
+        for size, coefficient, row in zip(SIZE, MEMORY, both, strict=True)
+    ]
+    return np.array(made)[:, 200:]
 
 
 @pytest.mark.parametrize("together", [-0.9, 0.0, 0.9])

@@ -41,7 +41,7 @@ q_bias_radps = { each_record = true, prior_sd = 0.05 }
 """
 TRUTH = {"Za": -5.0, "Zaa": 4.0, "Z0": 0.1, "Ma": -50.0, "Mq": -5.0, "Mde": -60.0, "M0": -0.5}
 BIAS = (0.02, -0.03)
-DT_S = 0.04
+DT_S, SAMPLES = 0.04, 76
 
 
 @pytest.fixture(autouse=True)
@@ -51,13 +51,13 @@ def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def flown(model: Path) -> list[pd.DataFrame]:
-    """Return two records of 5 s with noise, each with its bias of the gyro."""
+    """Return two records of 3 s with noise, each with its bias of the gyro."""
     rng = np.random.default_rng(3)
-    t = np.arange(120) * DT_S
+    t = np.arange(SAMPLES) * DT_S
     tables = []
     for number, bias in enumerate(BIAS):
-        u = 0.08 * np.where((t > 1) & (t < 4), np.sign(np.sin((3.0 + number) * t)), 0.0)
-        noise = rng.standard_normal((120, 2)) * [0.002, 0.008]
+        u = 0.08 * np.where((t > 0.5) & (t < 2.5), np.sign(np.sin((3.0 + number) * t)), 0.0)
+        noise = rng.standard_normal((SAMPLES, 2)) * [0.002, 0.008]
         problem = output_problem(read_model(model), [Maneuver(DT_S, u[:, None], noise)])
         theta = np.array([*TRUTH.values(), 0.0, 0.0, bias])
         found = problem.outputs(theta)
@@ -83,7 +83,7 @@ def test_two_records_give_the_truth_and_each_its_own_bias(tmp_path: Path) -> Non
     model = tmp_path / "mine.toml"
     model.write_text(TEXT, encoding="utf-8")
     answer = host.identify(
-        flown(model), models=model, methods="output-error-white", from_s=0.0, to_s=5.0
+        flown(model), models=model, methods="output-error-white", from_s=0.0, to_s=3.0
     )
     result = answer.linear[0].result
     half = result.half_width()
@@ -111,7 +111,7 @@ def test_a_method_of_linear_models_is_refused(tmp_path: Path, method: str) -> No
     model.write_text(TEXT, encoding="utf-8")
     table = flown(model)[0].assign(airspeed_mps=17.0)
     with pytest.raises(IdentificationError, match=r"pitch with a bend.* has equations"):
-        host.identify(table, models=model, methods=method, from_s=0.0, to_s=5.0)
+        host.identify(table, models=model, methods=method, from_s=0.0, to_s=3.0)
 
 
 def swinging() -> tuple[str, pd.DataFrame]:
