@@ -169,6 +169,8 @@ def _find_axis(
 ) -> list[DetectedManeuver]:
     dt_s = float(np.median(np.diff(t)))
     lag = max(1, round(LAG_S / dt_s))
+    # One row that is shorter than an edge shows each edge in two halves.
+    lag += lag == 1 and dt_s < LAG_S
     groups = _edges(axis, t, series, flying, lag)
     groups = _join_held(groups, t, series, lag)
     slow = sustained_inputs(t, series, flying, SLOW[axis == "throttle"])
