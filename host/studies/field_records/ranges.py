@@ -18,7 +18,7 @@ RANGES = {
     "downwash": (0.30, 0.50),  # d epsilon / d alpha: Etkin & Reid, Dynamics of Flight, B.5
     "sidewash": (0.10, 0.30),  # d sigma / d beta
     "tail_arm_chords": (2.4, 3.0),
-    "wash_lag": (0.8, 1.5),  # of the time from wing to tail
+    "wash_lag": (0.7, 1.2),  # of the time from wing to tail
     "bending_over_short_period": (2.7, 3.3),
     "bending_damping": (0.02, 0.06),
     "bending_share": (0.05, 0.20),  # of q's rms, in q
