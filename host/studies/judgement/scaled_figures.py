@@ -29,7 +29,7 @@ class Figure:
 
     def __str__(self) -> str:
         """Return the figure and half of its interval."""
-        half = 0.5 * (self.high - self.low)
+        half = round(0.5 * (self.high - self.low), 9)
         if np.isnan(self.value):
             return "-"
         return f"{self.value:.3g}" + ("" if np.isnan(half) else f" +- {half:.2g}")
@@ -71,21 +71,34 @@ def figures(own: Judged, scale: Mapping[str, float]) -> dict[str, Figure]:
         if len(flights) < 2:
             return Figure(value)
         spread = [of(w[place]) for w in weights]
-        low, high = np.nanpercentile(spread, [2.5, 97.5]).tolist()
+        low, high = np.percentile(spread, [2.5, 97.5]).tolist()
         return Figure(value, low, high)
 
     def share(part: BoolArray, of: BoolArray) -> Callable[[Array], float]:
         return lambda w: 100.0 * float(np.sum(w * (part & of))) / max(float(np.sum(w * of)), 1e-300)
 
+    def share_figure(part: BoolArray, of: BoolArray) -> Figure:
+        return _never_certain(figure(share(part, of)), len(np.unique(own.flight[of])))
+
     every = np.ones(len(place), dtype=bool)
-    found = {name: figure(share(part, every)) for name, part in shares(own).items()}
-    found["relied on of right"] = figure(share(own.relied, own.right))
-    found["coverage"] = figure(share(own.holds, own.answered))
+    found = {name: share_figure(part, every) for name, part in shares(own).items()}
+    found["relied on of right"] = share_figure(own.relied, own.right)
+    found["coverage"] = share_figure(own.holds, own.answered)
     by = np.array([scale.get(n, np.nan) for n in own.name])
     score = own.score() / by
-    found["score"] = figure(lambda w: float(np.nansum(w * score) / np.sum(w)))
+    found["score"] = figure(lambda w: float(np.sum(w * score) / np.sum(w)))
     found["honesty"] = figure(_honesty(own))
     return found
+
+
+def _never_certain(share: Figure, flights: int) -> Figure:
+    """Return a share whose interval is that of no exception in these flights, at least.
+
+    Drawn anew, flights that all agree always agree: 1 - 0.05^(1/n) is as likely (rule of three).
+    """
+    least = 100.0 * (1.0 - 0.05 ** (1.0 / max(flights, 1)))
+    low = min(share.low, 100.0 - least) if share.value >= 100.0 else share.low
+    return Figure(share.value, low, max(share.high, least) if share.value <= 0.0 else share.high)
 
 
 def _honesty(own: Judged) -> Callable[[Array], float]:
