@@ -24,7 +24,7 @@ from host.progress import progress_bar
 from host.readers.autopilot_flight import is_autopilot_log, read_autopilot
 from host.readers.autopilot_summary import autopilot_meta, summarise_autopilot, summary_lines
 from host.readers.gzip_file import given_path
-from host.readers.readable_file import readable_file
+from host.readers.readable_file import readable_file, refuse_table
 from host.terminal import command_line
 from host.text import shown
 
@@ -82,6 +82,7 @@ def decode(request: Request) -> Decoded:
         return decode_rows(request, path)
     if is_autopilot_log(path):
         return decode_autopilot(request, path)
+    refuse_table(path)
     if request.row_rate_hz is not None:
         raise UsageError(f"{path}: a log carries its times; --row-rate is for original ASCII rows")
     kind, target = destination(request, path)

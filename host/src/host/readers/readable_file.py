@@ -6,6 +6,7 @@ from pathlib import Path
 
 from host.errors import NotALogError
 from host.readers.gzip_file import expanded, is_gzip
+from host.terminal import command_line
 
 HEAD_BYTES = 4096
 BLACKBOX = (
@@ -34,6 +35,7 @@ KINDS: tuple[tuple[bytes, bool, str], ...] = (
     (b"\xfd7zXZ", True, "packed by xz; `unxz {name}`"),
     (b"\x28\xb5\x2f\xfd", True, "packed by zstd; `unzstd {name}`"),
 )  # fmt: skip
+TABLES = (".csv", ".tsv", ".parquet", ".mat")
 ZIP, EXCEL_PART = b"PK\x03\x04", (b"[Content_Types].xml", b"xl/")
 DATAFLASH, SDLOG2 = b"\xa3\x95", b"StartTime"
 
@@ -55,6 +57,22 @@ def readable_file(source: Path) -> Path:
             words = kind.format(name=source.name, stem=source.stem)
             raise NotALogError(f"{source}: {words}")
     return source
+
+
+def refuse_table(source: Path) -> None:
+    """Refuse a table where a log is decoded, and say which verbs read it.
+
+    Raises
+    ------
+    NotALogError
+        If the file has the ending of a table.
+    """
+    if source.suffix.lower() in TABLES:
+        look = command_line("host", "maneuvers", source)
+        raise NotALogError(
+            f"{source}: a table, not a log; `{look}` reads it, with --map where its names are"
+            " others"
+        )
 
 
 def _other_kind(head: bytes, source: Path) -> str:

@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     from host.log.source import check_source
     from host.readers.autopilot_flight import is_autopilot_log, log_choices, read_autopilot
     from host.readers.autopilot_summary import summarise_autopilot, summary_lines
-    from host.readers.readable_file import readable_file
+    from host.readers.readable_file import readable_file, refuse_table
     from host.text import shown
 
     source = check_source(source_or_newest(args.source))
@@ -64,6 +64,7 @@ def run(args: argparse.Namespace) -> int:
             else "\n".join(map(shown, summary_lines(summary)))
         )
         return int(ExitCode.OK)
+    refuse_table(source)
     head = describe(source)
     print(json.dumps(head, indent=2) if args.json else "\n".join(map(shown, head_lines(head))))
     return int(ExitCode.OK)
