@@ -136,6 +136,25 @@ def test_a_header_is_judged_by_the_suite_that_includes_it(tree: Path) -> None:
     }
 
 
+def test_what_does_not_include_a_header_is_compiled_once(tree: Path) -> None:
+    (tree / "drivers").mkdir()
+    (tree / "drivers" / "clamp.h").write_text(HEADER)
+    suite = tree / "suites" / "test_clamp" / "test_clamp.cpp"
+    declared = "uint8_t at_most(uint8_t value, uint8_t most);\n"
+    suite.write_text(SUITE.replace(declared, '#include "drivers/clamp.h"\n'))
+    other = '#include "check.h"\nTEST_CASE("another") { CHECK_EQ(1, 1); }\n'
+    suite.with_name("other.cpp").write_text(other)
+    (folder := tree / "out").mkdir()
+    one = judge.Judge("drivers/clamp.h", ("test_clamp",), folder, tree / "shared")
+    assert one._including == [suite]
+    before = {path.name for path in (tree / "shared").iterdir()}
+    assert one.verdict(judge.Mutant(HEADER.replace("> most", "< most"), 1, "", ""), {}) == "killed"
+    assert {path.name for path in (tree / "shared").iterdir()} == before
+    suite.write_text(SUITE)
+    with pytest.raises(judge.MutantError, match="none of test_clamp includes it"):
+        judge.Judge("drivers/clamp.h", ("test_clamp",), folder, tree / "shared")
+
+
 def test_a_file_that_fails_its_own_suite_is_refused(tree: Path) -> None:
     (tree / "core" / "clamp.cpp").write_text(SOURCE.replace("value > most", "value < most"))
     folder = tree / "out"
@@ -145,7 +164,10 @@ def test_a_file_that_fails_its_own_suite_is_refused(tree: Path) -> None:
 
 
 def test_a_run_goes_on_and_survivors_are_judged_again_by_a_new_suite(tree: Path) -> None:
+    few = judge.judge_file("core/clamp.cpp", ("test_clamp",), jobs=1, most=3, out=tree / "notes")
+    assert few.judged == f"3 of {few.made}"
     first = judge.judge_file("core/clamp.cpp", ("test_clamp",), jobs=1, out=tree / "notes")
+    assert first.judged == "all"
     assert first.count(judge.KILLED) > 3
     assert any("value + 3" in one.was for one in first.survivors)
     suite = tree / "suites" / "test_clamp" / "test_clamp.cpp"
