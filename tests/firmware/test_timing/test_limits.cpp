@@ -267,6 +267,11 @@ TEST_CASE("the radio's budget grows by a 64th of a second, to half a second, to 
   CHECK(budget.take(320, kStartUs + 33 * kStepUs + 5));
   CHECK(!budget.take(1, kStartUs + 34 * kStepUs + 4));
   CHECK(budget.take(10, kStartUs + 34 * kStepUs + 5));
+  budget.start(kStartUs, 640);
+  CHECK(budget.take(320, kStartUs + 33 * kStepUs));
+  CHECK(!budget.take(1, kStartUs + 33 * kStepUs));
+  CHECK(!budget.take(1, kStartUs + 34 * kStepUs - 1));
+  CHECK(budget.take(10, kStartUs + 34 * kStepUs));
   // A start has nothing saved.
   budget.start(kStartUs, 640);
   CHECK(!budget.take(320, kStartUs + 20 * kStepUs));
