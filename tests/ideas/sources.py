@@ -50,6 +50,23 @@ class Module:
         """Return the name of the file; of a package that of its folder."""
         return self.name.rpartition(".")[2]
 
+    @cached_property
+    def offered(self) -> dict[str, str]:
+        """Return what a face offers (`host.faces.lazily`): module, relative, by name."""
+        for node in self.tree.body:
+            made = node.value if isinstance(node, ast.Assign) else None
+            if isinstance(made, ast.Call) and ast.unparse(made.func) == "lazily":
+                return dict(ast.literal_eval(made.args[-1]))
+        return {}
+
+    def homes(self, name: str, known: Mapping[str, Module]) -> list[str]:
+        """Return the module that holds a name of this face; nothing of another file."""
+        if name not in self.offered:
+            return []
+        up = len(self.offered[name]) - len(self.offered[name].lstrip("."))
+        package = ".".join(self.name.split(".")[: len(self.name.split(".")) - up])
+        return [m for m in (f"{package}.{self.offered[name].lstrip('.')}",) if m in known]
+
     @property
     def lines(self) -> int:
         """Return how many lines the file has."""
@@ -136,7 +153,8 @@ def _own(node: ast.AST) -> Iterator[ast.AST]:
 def imports(module: Module, known: Mapping[str, Module], *, by_name: bool = True) -> set[str]:
     """Return the modules of the package that one imports when it runs, in functions too.
 
-    Imports for type checkers are left out.
+    Imports for type checkers are left out. A name that a face offers leads to the module that it
+    is in, and no other name of that face does.
 
     Parameters
     ----------
@@ -166,6 +184,11 @@ def _collect(
         for name in node.names:
             inner = f"{base}.{name.name}"
             found.update({inner if inner in known else base} & set(known))
+            if base in known:
+                found.update(known[base].homes(name.name, known))
+    elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+        for face in [one for one in found if one.rpartition(".")[2] == node.value.id]:
+            found.update(known[face].homes(node.attr, known))
     elif by_name and isinstance(node, ast.Constant) and isinstance(node.value, str):
         found.update(set(MODULE_NAME.findall(node.value)) & set(known))
     for child in ast.iter_child_nodes(node):

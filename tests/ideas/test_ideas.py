@@ -78,6 +78,17 @@ def f():
     assert reachable(["host.a"], known) == {"host.a", "host.b", "host.c"}
 
 
+def test_a_name_of_a_face_leads_to_its_own_module_and_to_no_other(tmp_path: Path) -> None:
+    face = '__getattr__ = lazily(__name__, {"one": "c", "two": "d", "three": ".e"})'
+    text = "from host import b\nfrom host.b import two\ndef f():\n    return b.three"
+    written(tmp_path, a=text, c="", d="", e="")
+    (tmp_path / "host" / "b").mkdir()
+    for name, inside in (("__init__", face), ("c", ""), ("d", "")):
+        (tmp_path / "host" / "b" / f"{name}.py").write_text(inside)
+    known = modules(tmp_path)
+    assert imports(known["host.a"], known) == {"host.b", "host.b.d", "host.e"}
+
+
 def test_methods_of_a_registry_are_reached(tmp_path: Path) -> None:
     known = written(tmp_path, a='M = {"one": Method("b", "fit")}', b="", c="")
     assert reachable(["host.a"], known) == {"host.a", "host.b"}

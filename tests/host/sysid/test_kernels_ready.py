@@ -15,7 +15,7 @@ from host.sysid.numerics import recursion
 STUDIES = Path(__file__).parents[3] / "host"
 METHODS = """
 import json, sys
-from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators import fit
 from studies.aircraft import navion_structured
 from studies.data import TRUTH, with_rates
 
@@ -48,7 +48,7 @@ def codes():
 built = codes()
 import numpy as np
 from host.aircraft.powerplant import powerplant
-from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators import fit
 from studies.aircraft import navion_structured
 from studies.data import TRUTH, with_rates
 model = navion_structured().with_start(1.1 * TRUTH)

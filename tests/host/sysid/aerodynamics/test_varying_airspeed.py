@@ -8,7 +8,7 @@ from host.errors import IdentificationError
 from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.varying_airspeed import VaryingModel
 from host.sysid.models import Trim, template
-from host.sysid.models.state_space_model import without_outputs
+from host.sysid.models.reduced_model import without_outputs
 from studies.gusts import AXES, DT_S, gusty_aircraft
 from studies.nonlinear_gusts import NonlinearFlight, fly_nonlinear, varying
 from studies.turbulence import fit_both, nonlinear_setup

@@ -210,7 +210,7 @@ def test_in_calm_air_output_error_tells_delays_by_slow_columns() -> None:
 
 
 def test_without_a_compiler_output_error_stands_in(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("host.sysid.numerics.equation_filter_problem.has_compiler", lambda: False)
+    monkeypatch.setattr("host.sysid.numerics.model_problems.has_compiler", lambda: False)
     answer = host.identify(held(record(0)), models="longitudinal", stretches=[(4.0, 19.5)])
     assert answer.linear[0].method == "output-error-white"
     assert any("numba" in line for line in answer.linear[0].result.warnings)

@@ -17,7 +17,7 @@ from host.sysid.answer import true_coefficients
 from host.sysid.errors.trim_departure import spin_of
 from host.sysid.estimators import fit
 from host.sysid.estimators.start_values import regression_estimates, start_values
-from host.sysid.flight.reconstructed_flight import flown_maneuvers, reconstruct_flight
+from host.sysid.flight import flown_maneuvers, reconstruct_flight
 from host.sysid.linear import gust_at_trim, linear_estimator, linear_fit
 from host.sysid.linear.linear_model import imu_place_m, without_attitude
 from host.sysid.maneuvers import DetectedManeuver

@@ -256,7 +256,7 @@ def test_filter_error_takes_delays_of_outputs_and_inputs() -> None:
 def test_without_a_compiler_a_long_record_is_refused_in_a_line(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("host.sysid.numerics.equation_filter_problem.has_compiler", lambda: False)
+    monkeypatch.setattr("host.sysid.numerics.model_problems.has_compiler", lambda: False)
     still: Array = np.tile(rolled().outputs, (11, 1))
     long = Maneuver(DT_S, np.tile(rolled().inputs, (11, 1)), still)
     with pytest.raises(IdentificationError, match="takes hours without numba"):

@@ -9,11 +9,8 @@ from host.physical.recording import FOREIGN, OWN
 from host.sysid.estimators.filter_error import fit_filter_error
 from host.sysid.estimators.gust_model import gust_model
 from host.sysid.estimators.innovation_search import noise_floor
-from host.sysid.flight.reconstructed_flight import (
-    OWN_ATTITUDE_RAD,
-    flown_maneuvers,
-    reconstruct_flight,
-)
+from host.sysid.flight import flown_maneuvers, reconstruct_flight
+from host.sysid.flight.reconstructed_flight import OWN_ATTITUDE_RAD
 from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import Maneuver, Trim, template
 from host.sysid.reconstruction.reconstruction import Compatibility

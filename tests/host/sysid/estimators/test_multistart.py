@@ -10,7 +10,7 @@ from host.sysid.estimators.multistart import multistart, white_cost
 from host.sysid.estimators.start_values import start_values
 from host.sysid.models import LinearModel, Maneuver, free_model
 from host.sysid.numerics.output_error import Optimum, minimise
-from host.sysid.numerics.output_error_problem import OutputProblem, Response
+from host.sysid.numerics.output_error_problem import OutputProblem
 from studies.aircraft import navion_free
 from studies.data import noisy
 from studies.inputs import SHAPES
@@ -44,7 +44,7 @@ def test_slopes_beyond_all_numbers_are_said(monkeypatch: pytest.MonkeyPatch) -> 
     problem, truth = drawn(1)
     respond = problem.respond
 
-    def steep(theta: Array) -> list[Response] | None:
+    def steep(theta: Array) -> object:
         responses = respond(theta)
         if responses is not None:
             responses[0].sensitivities[0, -1, 0] = np.inf

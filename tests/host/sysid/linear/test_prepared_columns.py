@@ -6,8 +6,7 @@ import pytest
 from host.physical.recording import FOREIGN, OWN, Recording
 from host.sysid.flight import FlownManeuver, changed_columns
 from host.sysid.linear import LinearEstimate, LinearEstimator
-from host.sysid.pipeline import at_hand
-from host.sysid.pipeline.flight_preparation import prepare
+from host.sysid.pipeline import at_hand, prepare
 from studies.wrong_flights import fly
 
 

@@ -13,8 +13,9 @@ from host.sysid.models import Trim, model_from, read_model, template
 from host.sysid.models.modal_analysis import longitudinal_names
 from host.sysid.models.model_file import parse_entry
 from host.sysid.models.model_text import model_text
+from host.sysid.models.reduced_model import without_outputs
 from host.sysid.models.residual_delays import without_standard_delays
-from host.sysid.models.state_space_model import DelayGroup, without_outputs
+from host.sysid.models.state_space_model import DelayGroup
 from host.sysid.models.templates import TEMPLATES, longitudinal
 
 TRIM = Trim(airspeed_mps=17.0, alpha_rad=0.1, theta_rad=0.16)

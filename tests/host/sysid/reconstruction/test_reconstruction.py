@@ -11,7 +11,7 @@ from host.aircraft.mass_properties import airframe_data
 from host.constants import GRAVITY_MPS2, NORMAL_95
 from host.errors import IdentificationError
 from host.instrument.deviations import sensor_error_model
-from host.sysid.numerics.output_error_problem import Response
+from host.sysid.numerics.response import Response
 from host.sysid.reconstruction.flight_path import (
     AIR,
     GPS,

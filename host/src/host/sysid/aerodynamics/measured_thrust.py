@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.aircraft.powerplant import Powerplant
+from host.aircraft.powerplant import Powerplant, without_propeller
 from host.arrays import Array
+from host.sysid.models.thrust_column import THRUST
 
 # Of a small fixed-pitch propeller in level flight, where nothing says what its own is: wind-tunnel
 # data of such propellers (UIUC propeller data site, volume 1) have 0.5 to 0.7 about their best.
@@ -56,3 +57,18 @@ def thrust_column(columns: Mapping[str, Array], powerplant: Powerplant) -> Fligh
     if powerplant.present and "throttle" in columns:
         return FlightThrust(None, True)
     return FlightThrust(np.zeros(len(columns["t_s"])), False)
+
+
+def with_thrust(columns: Mapping[str, Array], powerplant: Powerplant | None) -> Mapping[str, Array]:
+    """Return columns with the thrust that was measured, or follows from measured power, in one.
+
+    Parameters
+    ----------
+    columns : mapping of (n,) Array
+    powerplant : Powerplant or None
+        Its propeller makes thrust of power.
+    """
+    found = thrust_column(columns, powerplant or without_propeller())
+    if not found.known or found.thrust_n is None:
+        return columns
+    return {**columns, THRUST: found.thrust_n}

@@ -11,19 +11,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.aircraft.mass_properties import AirframeData
-from host.aircraft.powerplant import Powerplant, without_propeller
-from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.sysid.aerodynamics.left_out_terms import LeftOutTerm, acting_terms, expected_left_out
-from host.sysid.aerodynamics.measured_thrust import EFFICIENCY_SHARE, thrust_column
-from host.sysid.models.maneuver import Maneuver
+from host.sysid.aerodynamics.measured_thrust import EFFICIENCY_SHARE
 from host.sysid.models.state_space_model import LinearModel, Parameter
-from host.sysid.models.templates import Trim
 from host.sysid.models.thrust_column import THRUST
+
+if TYPE_CHECKING:
+    from host.aircraft.mass_properties import AirframeData
+    from host.arrays import Array
+    from host.sysid.models.maneuver import Maneuver
+    from host.sysid.models.templates import Trim
 
 THRUST_ROWS = {"airspeed_mps": "D_thrust", "alpha_rad": "Z_thrust", "q_radps": "M_thrust"}
 # Of thrust, rms: what changes less moves a model by less than its noise does.
@@ -31,21 +33,6 @@ LEAST_SHARE = 0.03
 THRUST_BESIDE = "thrust changed, and stands beside the model as measured: D_V is at constant thrust"
 NORMAL_SHARE = 0.2  # of thrust that acts normal to the path, one deviation
 TRIMMED_RAD = 0.2  # of elevator that holds the moment of thrust, one deviation
-
-
-def with_thrust(columns: Mapping[str, Array], powerplant: Powerplant | None) -> Mapping[str, Array]:
-    """Return columns with the thrust that was measured, or follows from measured power, in one.
-
-    Parameters
-    ----------
-    columns : mapping of (n,) Array
-    powerplant : Powerplant or None
-        Its propeller makes thrust of power.
-    """
-    found = thrust_column(columns, powerplant or without_propeller())
-    if not found.known or found.thrust_n is None:
-        return columns
-    return {**columns, THRUST: found.thrust_n}
 
 
 def thrust_terms(

@@ -12,17 +12,19 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import numpy as np
 
-from host.aircraft.file import Aircraft
-from host.arrays import Array
 from host.errors import IdentificationError
 from host.export.atomic_files import atomic_write
-from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
-from host.sysid.coefficients.coefficient_fit import MeanCondition
+
+if TYPE_CHECKING:
+    from host.aircraft.file import Aircraft
+    from host.arrays import Array
+    from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
+    from host.sysid.coefficients.coefficient_fit import MeanCondition
 
 # Names of the aircraft file for the names of the answer.
 AXES = {"CL": "cl", "Cm": "cm", "CY": "cy", "Cl": "croll", "Cn": "cn"}

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from host.arrays import Array
 from host.export.atomic_files import file_names
 from host.sysid.answer.figure_kinds import (
     Bar,
@@ -24,16 +23,17 @@ from host.sysid.answer.figure_kinds import (
 from host.sysid.answer.marks import UNSURE, USELESS, Verdict
 from host.sysid.answer.mat_file import labels
 from host.sysid.answer.truth_comparison import true_coefficients, true_poles
-from host.sysid.linear.linear_answer import Answer
 from host.sysid.models.diagnostics import reference_values
-from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.parameter_units import parameter_unit
 from host.sysid.reconstruction.inverse_sensor_model import FIT_RATE_HZ
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from host.arrays import Array
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+    from host.sysid.linear.linear_answer import Answer
+    from host.sysid.models.modal_analysis import Mode
 
 SCATTER = 300
 MOVED_SHARE = 0.2  # of the largest input: less is an answer of the pilot, not the test

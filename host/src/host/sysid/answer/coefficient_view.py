@@ -9,13 +9,21 @@ from typing import TYPE_CHECKING
 
 from host.sysid.answer.advised_inputs import advised_input
 from host.sysid.answer.doubt import Doubt, doubt
-from host.sysid.answer.linear_rules import percent
-from host.sysid.answer.marks import Judged, mark_of, share_text
-from host.sysid.checks.data_finding import Feedback, Finding
+from host.sysid.answer.marks import Judged, mark_of, percent, share_text
+from host.sysid.answer.trust_rules import (
+    Rule,
+    fit_fails,
+    impossible_sign,
+    input_feedback,
+    not_predicted,
+    open_finding,
+    own,
+)
 from host.sysid.coefficients.coefficient_fit import FLAG_SHARE
-from host.sysid.models.model_file import standard_model
+from host.sysid.models.coefficient_model import standard_model
 
 if TYPE_CHECKING:
+    from host.sysid.checks.data_finding import Feedback, Finding
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 
 WORSE = 1.25  # NRMSE of unseen over fitted maneuvers: more is a model that does not carry over
@@ -45,6 +53,11 @@ class CoefficientView:
     """What rules and verdict read of coefficients fitted directly (`EstimateView`)."""
 
     answer: CoefficientAnswer
+
+    @property
+    def rules(self) -> Sequence[Rule]:
+        """What may speak against its estimates, in order."""
+        return RULES
 
     @property
     def heading(self) -> str:
@@ -206,3 +219,13 @@ def _prediction_line(answer: CoefficientAnswer) -> str:
         f"  prediction of unseen maneuvers ({len(found.windows)} of {count}, each by the others): "
         + ("fails for " + ", ".join(poor) if poor else "holds for every coefficient")
     )
+
+
+RULES: tuple[Rule, ...] = (
+    open_finding,
+    input_feedback,
+    fit_fails,
+    not_predicted,
+    impossible_sign,
+    own(lambda answer, _: lag_beside(answer)),
+)

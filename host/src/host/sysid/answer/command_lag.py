@@ -8,7 +8,10 @@ cannot be told apart. On a real autopilot's records two lags 87 ms apart fitted 
 
 from __future__ import annotations
 
-from host.sysid.linear.linear_answer import Answer
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from host.sysid.linear.linear_answer import Answer
 
 RATE = "_radps"  # ends the name of a state that a control's moment changes
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from host.people_units import people_name
-from host.sysid.linear.linear_answer import Answer
 from host.sysid.models.model_constants import known_constants
 from host.sysid.models.parameter_units import parameter_unit
+
+if TYPE_CHECKING:
+    from host.sysid.linear.linear_answer import Answer
 
 IN_A_LINE = 4  # maneuvers
 # Half-width over value from which a constant only trades with another: without the bank angle the

@@ -4,11 +4,14 @@ interval too, so that it may be wider than the derivative, and it is never bette
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from host.aircraft.gains import dimensional_name
-from host.sysid.aerodynamics.coefficient_table import Coefficient
 from host.sysid.answer.marks import MARKS, SMALL, Judged, mark_of
-from host.sysid.linear.linear_answer import Answer
+
+if TYPE_CHECKING:
+    from host.sysid.aerodynamics.coefficient_table import Coefficient
+    from host.sysid.linear.linear_answer import Answer
 
 
 def converted_marks(answer: Answer, marks: Mapping[str, str]) -> dict[str, str]:

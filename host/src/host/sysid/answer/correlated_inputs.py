@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import itertools
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.sysid.linear.linear_answer import Answer
+if TYPE_CHECKING:
+    from host.sysid.linear.linear_answer import Answer
 
 MIXED = 0.98  # correlation of two inputs
 

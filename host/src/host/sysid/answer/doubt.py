@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from host.sysid.checks.data_finding import Finding
-from host.sysid.linear.linear_answer import Answer
+if TYPE_CHECKING:
+    from host.sysid.checks.data_finding import Finding
+    from host.sysid.linear.linear_answer import Answer
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from host.constants import DEG_PER_RAD
 from host.sysid.answer.constant_lines import constant_lines
-from host.sysid.answer.linear_rules import unpredicted_states
+from host.sysid.answer.mode_lines import linear_mode_lines, mode_lines
 from host.sysid.answer.servo_lines import servo_estimate_lines
 from host.sysid.answer.settling_history import history_lines
-from host.sysid.linear.linear_answer import Answer
-from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.parameter_units import parameter_unit
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
-
-PARTICIPATION = 0.25  # in a mode: a state with more makes it what it is
+    from host.sysid.linear.linear_answer import Answer
 
 
 def model_lines(answer: Answer) -> list[str]:
@@ -46,7 +40,7 @@ def model_lines(answer: Answer) -> list[str]:
             + ("" if c.differs_from_zero else "  not told from zero")
             for c in answer.coefficients
         ]
-    lines += [*constant_lines(answer), *history_lines(answer), *mode_lines(answer)]
+    lines += [*constant_lines(answer), *history_lines(answer), *linear_mode_lines(answer)]
     for kind, fits in (
         ("free simulation, fitted data", answer.fits),
         ("free simulation, held-out data", answer.validation),
@@ -71,19 +65,6 @@ def _estimate_line(answer: Answer, name: str, value: float, half: float, unit: s
     return text.rstrip() if not marks else text + "".join(f"  {mark}" for mark in marks)
 
 
-def mode_lines(answer: Answer | CoefficientAnswer) -> list[str]:
-    """Return the modes, and of which a state that is not predicted takes a good part."""
-    if not isinstance(answer, Answer):
-        return [_mode_line(mode) for mode in answer.modes]
-    failing = unpredicted_states(answer)
-    lines = []
-    for mode in answer.modes:
-        in_it = _participating(answer, mode, list(failing))
-        mark = f"  not to be relied on: {', '.join(failing[s] for s in in_it)}" if in_it else ""
-        lines.append(_mode_line(mode) + mark)
-    return lines
-
-
 def coefficient_lines(answer: CoefficientAnswer) -> list[str]:
     """Return coefficients, modes, delays and fit as a table for people."""
     flight = answer.fit.condition
@@ -99,7 +80,7 @@ def coefficient_lines(answer: CoefficientAnswer) -> list[str]:
         line += f"{small}  {cause}" + ("  flagged" if d.flagged else "")
         lines.append(line.rstrip())
     lines.append("  CD_0 is the drag at zero lift, surfaces as flown")
-    lines += mode_lines(answer)
+    lines += mode_lines(answer.modes)
     delays = ", ".join(
         f"{name.split('_')[1]} {1e3 * value:+.2f} +- {1e3 * half:.2f} ms"
         for name, (value, half) in answer.delays.items()
@@ -115,28 +96,3 @@ def coefficient_lines(answer: CoefficientAnswer) -> list[str]:
         )
         lines.append(f"  the same below 4.5 Hz, fitted / unseen (leave-one-out): {shares}")
     return lines
-
-
-def _participating(answer: Answer, mode: Mode, states: Sequence[str]) -> list[str]:
-    """Return the states with a large share in a mode, among those given."""
-    values, right = np.linalg.eig(answer.result.matrices()[0])
-    left = np.linalg.inv(right)
-    k = int(np.argmin(np.abs(values - mode.eigenvalue)))
-    part = np.abs(left[k] * right[:, k])
-    shares = dict(zip(answer.model.states, part / part.sum(), strict=True))
-    return [state for state in states if shares[state] > PARTICIPATION]
-
-
-def _mode_line(mode: Mode) -> str:
-    half = mode.frequency_half_width_radps
-    if not mode.oscillatory:
-        return f"  {mode.name}: {mode.eigenvalue.real:.3f} +- {_width(half)} 1/s"
-    return (
-        f"  {mode.name}: {mode.frequency_radps:.3f} +- {_width(half)} rad/s,"
-        f" damping {mode.damping:.3f} +- {_width(mode.damping_half_width)}"
-    )
-
-
-def _width(half: float) -> str:
-    """Return a half-width with three decimals, or as many as it takes to be none of zero."""
-    return f"{half:.3f}" if half >= 0.001 else f"{half:.1g}"

@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
-from host.sysid.answer.marks import Judged
-from host.sysid.checks.data_finding import Feedback, Finding
+if TYPE_CHECKING:
+    from host.sysid.answer.marks import Judged
+    from host.sysid.answer.trust_rules import Rule
+    from host.sysid.checks.data_finding import Feedback, Finding
+    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+    from host.sysid.linear.linear_answer import Answer
 
 
 class EstimateView(Protocol):
     """An answer as its verdict reads it: estimates, what each leans on, lines of its own."""
+
+    @property
+    def answer(self) -> Any:
+        """What is judged, as its own rules read it."""
+
+    @property
+    def rules(self) -> Sequence[Rule]:
+        """What may speak against its estimates, in order: one table."""
 
     @property
     def heading(self) -> str:
@@ -56,3 +68,22 @@ class EstimateView(Protocol):
 
     def further_lines(self, findings: Sequence[Finding]) -> Sequence[str]:
         """Return the lines behind the doubts: identifiability, inputs, prediction."""
+
+
+def views_of(
+    linear: Sequence[Answer], coefficients: CoefficientAnswer | None
+) -> list[EstimateView]:
+    """Return the view of each answer, those of linear models first.
+
+    What reads a kind of answer is imported where there is one.
+    """
+    views: list[EstimateView] = []
+    if linear:
+        from host.sysid.answer.linear_view import LinearView
+
+        views += [LinearView(answer) for answer in linear]
+    if coefficients is not None:
+        from host.sysid.answer.coefficient_view import CoefficientView
+
+        views.append(CoefficientView(coefficients))
+    return views

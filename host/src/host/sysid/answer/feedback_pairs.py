@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from host.constants import NORMAL_95
 from host.sysid.answer.marks import FAIR
-from host.sysid.checks.data_finding import Feedback, Finding
-from host.sysid.linear.linear_answer import Answer
-from host.sysid.models.state_space_model import LinearModel
+
+if TYPE_CHECKING:
+    from host.sysid.checks.data_finding import Feedback, Finding
+    from host.sysid.linear.linear_answer import Answer
+    from host.sysid.models.state_space_model import LinearModel
 
 
 def feedback_of(findings: Iterable[Finding]) -> list[Feedback]:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.arrays import Array
 from host.constants import DEG_PER_RAD
 from host.errors import IdentificationError
 from host.export.atomic_files import atomic_write
@@ -18,6 +17,8 @@ from host.extras import install_hint
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from host.arrays import Array
 
 MEASURED, MODEL, RESIDUAL, MARKED, TRUTH = "0.7", "C3", "C0", "C3", "black"
 INPUT, HELD_OUT_SHADE = "C2", "#fdf3dc"

@@ -11,23 +11,23 @@ import numpy as np
 
 from host.sysid.answer.converted_marks import converted_marks
 from host.sysid.answer.linear_rules import unpredicted_states
-from host.sysid.answer.marks import Verdict
 from host.sysid.answer.servo_lines import servo_document
 from host.sysid.answer.settling_history import settling_document
 from host.sysid.coefficients.coefficient_fit import METHOD
 from host.sysid.flight.reconstructed_flight import maneuver_name
-from host.sysid.linear.linear_answer import Answer
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
-from host.sysid.maneuvers.maneuver_grade import Grade
-from host.sysid.models.diagnostics import SignalFit
-from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.model_constants import known_constants
 from host.sysid.models.parameter_units import parameter_unit
 from host.sysid.reconstruction.sensor_corrections import correction_document
 
 if TYPE_CHECKING:
+    from host.sysid.answer.marks import Verdict
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
     from host.sysid.coefficients.deletion_diagnostics import CrossValidation
+    from host.sysid.linear.linear_answer import Answer
+    from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+    from host.sysid.maneuvers.maneuver_grade import Grade
+    from host.sysid.models.diagnostics import SignalFit
+    from host.sysid.models.modal_analysis import Mode
     from host.sysid.numerics.maneuver_agreement import ManeuverAgreement
 
 

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from host.sysid.answer.command_lag import lag_lookalikes, unknown_lag
 from host.sysid.answer.correlated_inputs import derivatives_of_both
 from host.sysid.answer.doubt import Doubt, Evidence, doubt
+from host.sysid.answer.marks import percent
 from host.sysid.answer.method_agreement import disagreements
 from host.sysid.answer.parameter_places import leaning_on
 from host.sysid.errors.systematic_errors import is_template, scaled_by_airspeed
-from host.sysid.linear.linear_answer import Answer
-from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.validation.prediction_limits import FAILS, Prediction
+
+if TYPE_CHECKING:
+    from host.sysid.linear.linear_answer import Answer
+    from host.sysid.models.diagnostics import SignalFit
 
 AIRSPEED = "airspeed_mps"
 WORSE_THAN_NONE = 1.0  # NRMSE: the mean would do better
@@ -172,11 +175,6 @@ def missed_beyond(answer: Answer, fit: SignalFit) -> str:
     if found is None or found.holds:
         return f" (NRMSE {percent(fit.nrmse)})"
     return f" (NRMSE {percent(found.nrmse)}, noise and intervals allow {percent(found.largest)})"
-
-
-def percent(share: float) -> str:
-    """Return a share for people; a simulation that diverges has none."""
-    return f"{100.0 * share:.0f} %" if math.isfinite(share) else "none, it diverges"
 
 
 def _reached(value: float, bound: float) -> bool:

@@ -5,27 +5,59 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from host.sysid.answer.advised_inputs import advised_input
 from host.sysid.answer.correlated_inputs import correlated_inputs
 from host.sysid.answer.feedback_pairs import alike_derivatives, combined_derivatives
 from host.sysid.answer.linear_rules import (
+    delay_at_bound,
     divided_by,
+    driven_by_inputs,
     failing_fits,
+    lag_unknown,
+    methods_disagree,
     missed_beyond,
-    percent,
+    motion_left_out,
+    on_a_bound,
+    one_input_for_two,
     unpredicted,
 )
-from host.sysid.answer.marks import FAIR, SMALL, UNSURE, Judged, mark_of, share_text
+from host.sysid.answer.marks import FAIR, SMALL, UNSURE, Judged, mark_of, percent, share_text
 from host.sysid.answer.parameter_places import leaning_on
 from host.sysid.answer.servo_lines import servo_lines
-from host.sysid.checks.data_finding import Feedback, Finding
+from host.sysid.answer.trust_rules import (
+    Rule,
+    fit_fails,
+    impossible_sign,
+    input_feedback,
+    not_predicted,
+    open_finding,
+    own,
+)
 from host.sysid.errors.surface_motion import HELD_SURFACES
-from host.sysid.estimators.users_model import NOISE_CHOSEN
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.linear.users_model import NOISE_CHOSEN
 from host.sysid.models.diagnostics import NOT_IDENTIFIABLE, reference_values
 
+if TYPE_CHECKING:
+    from host.sysid.checks.data_finding import Feedback, Finding
+    from host.sysid.linear.linear_answer import Answer
+
 PLACE = "imu_"  # begins the name of a sensor's place: no property of the aircraft
+RULES: tuple[Rule, ...] = (
+    open_finding,
+    input_feedback,
+    own(lag_unknown),
+    fit_fails,
+    not_predicted,
+    own(driven_by_inputs),
+    own(delay_at_bound),
+    own(on_a_bound),
+    impossible_sign,
+    own(methods_disagree),
+    own(one_input_for_two),
+    own(motion_left_out),
+)
 
 
 @dataclass(frozen=True)
@@ -33,6 +65,11 @@ class LinearView:
     """What rules and verdict read of a linear model (`EstimateView`)."""
 
     answer: Answer
+
+    @property
+    def rules(self) -> Sequence[Rule]:
+        """What may speak against its estimates, in order."""
+        return RULES
 
     @property
     def heading(self) -> str:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from host.constants import DEG_PER_RAD
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
-from host.sysid.maneuvers.maneuver_grade import Grade
+
+if TYPE_CHECKING:
+    from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+    from host.sysid.maneuvers.maneuver_grade import Grade
 
 
 def maneuver_lines(graded: Sequence[tuple[DetectedManeuver, Grade]]) -> list[str]:

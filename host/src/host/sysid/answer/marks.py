@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -67,12 +68,15 @@ class Verdict:
         The same in words, with the reasons and what to fly again; the heading is the first.
     reasons : dict
         Parameter to why it stands under its mark, a plain line each.
+    fair : float
+        Largest share of a half-width in its estimate that is used with care.
     """
 
     heading: str
     marks: dict[str, str]
     lines: tuple[str, ...]
     reasons: dict[str, tuple[str, ...]]
+    fair: float = FAIR
 
 
 def names_marked(marks: Mapping[str, str], mark: str) -> list[str]:
@@ -87,3 +91,8 @@ def share_text(share: float, fair: float = FAIR) -> str:
     text = f"{100.0 * share:.0f}"
     beyond = any(share > limit and text == f"{100.0 * limit:.0f}" for limit in (TRUST, fair))
     return f"{100.0 * share:.1f} %" if beyond else f"{text} %"
+
+
+def percent(share: float) -> str:
+    """Return a share for people; a simulation that diverges has none."""
+    return f"{100.0 * share:.0f} %" if math.isfinite(share) else "none, it diverges"

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from host.arrays import Array
 from host.export.mat_writer import cells, mat_name, write_mat
-from host.sysid.linear.linear_answer import Answer
-from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.parameter_units import parameter_unit
 from host.sysid.reconstruction.inverse_sensor_model import FIT_RATE_HZ
 
 if TYPE_CHECKING:
+    from host.arrays import Array
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+    from host.sysid.linear.linear_answer import Answer
+    from host.sysid.models.modal_analysis import Mode
 
 
 def write_answers(path: Path, answers: Sequence[Answer], direct: CoefficientAnswer | None) -> None:

@@ -12,12 +12,15 @@ in their regressors, filter error takes coloured sensor noise for moving air.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import special
 
 from host.sysid.estimators.method_registry import find_method
-from host.sysid.linear.linear_answer import Answer
+
+if TYPE_CHECKING:
+    from host.sysid.linear.linear_answer import Answer
 
 SIGNIFICANCE = 0.01
 LEAST_SHARE = 0.1

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from host.sysid.linear.linear_answer import Answer
+if TYPE_CHECKING:
+    from host.sysid.linear.linear_answer import Answer
 
 NAME, CELL = 14, 22  # characters: three methods in 80, four in 120
 

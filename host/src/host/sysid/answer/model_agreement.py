@@ -14,10 +14,10 @@ import numpy as np
 
 from host.sysid.answer.doubt import Doubt
 from host.sysid.answer.marks import CAREFUL, TRUSTED
-from host.sysid.linear.linear_answer import Answer
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+    from host.sysid.linear.linear_answer import Answer
 
 DIMENSIONAL = {"CL": "Z", "CD": "D", "CY": "Y", "Cl": "L", "Cm": "M", "Cn": "N"}
 RELIED_ON = (TRUSTED, CAREFUL)

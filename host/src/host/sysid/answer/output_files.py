@@ -8,20 +8,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from host.arrays import Array
 from host.errors import IdentificationError
 from host.export.atomic_files import atomic_write, check_destination, file_names
 from host.extras import install_hint
-from host.sysid.aerodynamics.coefficient_table import CoefficientTable
-from host.sysid.answer.marks import Verdict
 from host.sysid.answer.mat_file import labels, write_answers
 from host.sysid.answer.settling_history import has_history, write_history
 from host.sysid.answer.simulator_forms import CONTROL, FORMS, files_of, form_of, write_form
 from host.sysid.estimators.method_registry import all_methods
-from host.sysid.linear.linear_answer import Answer
 
 if TYPE_CHECKING:
+    from host.arrays import Array
+    from host.sysid.aerodynamics.coefficient_table import CoefficientTable
+    from host.sysid.answer.marks import Verdict
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+    from host.sysid.linear.linear_answer import Answer
 
 ENDINGS = {
     "mat": (".mat",),

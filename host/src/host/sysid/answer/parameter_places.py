@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import TYPE_CHECKING
 
-from host.sysid.models.state_space_model import LinearModel, Term
+if TYPE_CHECKING:
+    from host.sysid.models.state_space_model import LinearModel, Term
 
 MAIN_GAIN = 0.5  # of a parameter's largest gain in the outputs: with less it is a guest there
 

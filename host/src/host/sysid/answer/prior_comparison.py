@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from host.aircraft.prior.prior_table import PriorTable, half_turned
-from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
+
+if TYPE_CHECKING:
+    from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 
 
 def prior_lines(tables: Sequence[CoefficientTable], prior: PriorTable) -> list[str]:

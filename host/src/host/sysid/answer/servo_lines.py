@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from host.sysid.answer.command_lag import lag_lookalikes, unknown_lag
-from host.sysid.estimators.servo_parameters import ServoEstimate
-from host.sysid.linear.linear_answer import Answer
+
+if TYPE_CHECKING:
+    from host.sysid.estimators.servo_parameters import ServoEstimate
+    from host.sysid.linear.linear_answer import Answer
 
 UNITS = {"servo_delay_s": "s", "servo_bandwidth_hz": "Hz", "servo_rate_limit_radps": "rad/s"}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,7 +12,9 @@ from host.export.atomic_files import atomic_write
 from host.sysid.estimators.estimation_method import loaded
 from host.sysid.estimators.method_registry import find_method
 from host.sysid.estimators.settling import STEPS, settling_of
-from host.sysid.linear.linear_answer import Answer
+
+if TYPE_CHECKING:
+    from host.sysid.linear.linear_answer import Answer
 
 
 def has_history(answer: Answer) -> bool:

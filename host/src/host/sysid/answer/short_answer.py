@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING
 from host.aircraft.gains import dimensional_name
 from host.constants import DEG_PER_RAD
 from host.sysid.answer.converted_marks import converted_marks
-from host.sysid.answer.estimate_lines import mode_lines
 from host.sysid.answer.marks import FAIR, SMALL, Verdict, share_text
-from host.sysid.coefficients.coefficient_fit import FLAG_SHARE
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.answer.mode_lines import linear_mode_lines, mode_lines
 from host.sysid.models.diagnostics import reference_values
 from host.sysid.models.parameter_units import parameter_unit
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+    from host.sysid.linear.linear_answer import Answer
 
 MOST_LINES = 40  # of the table: a screen
 # A derivative and the coefficient that stands beside it.
@@ -33,11 +32,11 @@ def mode_summary(linear: Sequence[Answer], direct: CoefficientAnswer | None) -> 
         by = f" by {answer.method}" if models.count(answer.template) > 1 else ""
         speed = f"{answer.condition.airspeed_mps:.2f} m/s" if known else "unknown airspeed"
         alpha = f"alpha {answer.trim.alpha_rad * DEG_PER_RAD:.1f} deg"
-        lines += [f"modes, {answer.template}{by} at {speed}, {alpha}", *mode_lines(answer)]
+        lines += [f"modes, {answer.template}{by} at {speed}, {alpha}", *linear_mode_lines(answer)]
     if direct and not linear:
         flight = direct.fit.condition
         alpha = f"alpha {flight.alpha_rad * DEG_PER_RAD:.1f} deg"
-        lines += [f"modes at {flight.airspeed_mps:.2f} m/s, {alpha}", *mode_lines(direct)]
+        lines += [f"modes at {flight.airspeed_mps:.2f} m/s, {alpha}", *mode_lines(direct.modes)]
     return lines
 
 
@@ -51,7 +50,7 @@ def short_table(
     both = zip(linear, verdicts, strict=False)
     rows = [row for answer, verdict in both for row in _linear_rows(answer, verdict.marks)]
     if direct:
-        rows += list(_direct_rows(direct, verdicts[-1].marks))
+        rows += list(_direct_rows(direct, verdicts[-1]))
     room = MOST_LINES - 1
     if len(rows) > room:
         rows = [*rows[: room - 1], f"  ... and {len(rows) - room + 1} more: --full"]
@@ -87,9 +86,10 @@ def _if_worse(mark: str, of_derivative: str) -> str:
     return "" if mark == of_derivative else f", {mark}"
 
 
-def _direct_rows(answer: CoefficientAnswer, marks: Mapping[str, str]) -> Iterator[str]:
+def _direct_rows(answer: CoefficientAnswer, verdict: Verdict) -> Iterator[str]:
     for d in answer.fit.derivatives:
-        yield _row(d.name, d.value, d.half_width, "", d.share, marks[d.name], "", FLAG_SHARE)
+        mark = verdict.marks[d.name]
+        yield _row(d.name, d.value, d.half_width, "", d.share, mark, "", verdict.fair)
 
 
 def _row(

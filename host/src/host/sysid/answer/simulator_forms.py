@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from host.aircraft.straight_lines import straight_coefficients
 from host.errors import IdentificationError
@@ -15,10 +16,12 @@ from host.export.simulators.flightgear import set_text, with_controls
 from host.export.simulators.gazebo import gazebo_text
 from host.export.simulators.python_control import StateSpace, control_text
 from host.export.simulators.straight_coefficients import SURFACES, StraightCoefficients
-from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.aircraft_export import identified_aircraft
-from host.sysid.coefficients.coefficient_fit import MeanCondition
-from host.sysid.linear.linear_answer import Answer
+
+if TYPE_CHECKING:
+    from host.sysid.aerodynamics.coefficient_table import CoefficientTable
+    from host.sysid.coefficients.coefficient_fit import MeanCondition
+    from host.sysid.linear.linear_answer import Answer
 
 FLIGHTGEAR, CONTROL = "-set.xml", ".control.py"
 STRAIGHT: dict[str, Callable[[StraightCoefficients], str]] = {

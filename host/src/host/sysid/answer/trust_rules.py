@@ -1,4 +1,4 @@
-"""What must hold before an estimate is trusted: one table of short rules for every kind of answer.
+"""What must hold before an estimate is trusted, whatever estimated it: the shared rules.
 
 A rule returns doubts: estimates and a reason. A doubted one stands neither under "trust" nor under
 "use with care", whatever its interval. An interval counts noise and gusts, not what a model lacks:
@@ -8,30 +8,22 @@ on a demonstration flight D_V was -0.33 +- 0.02 where -0.61 was true.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from host.sysid.answer.coefficient_view import CoefficientView, lag_beside
 from host.sysid.answer.doubt import Doubt, Evidence, doubt
-from host.sysid.answer.estimate_view import EstimateView
 from host.sysid.answer.feedback_pairs import feedback_of
 from host.sysid.answer.impossible_signs import impossible_signs
-from host.sysid.answer.linear_rules import (
-    delay_at_bound,
-    driven_by_inputs,
-    lag_unknown,
-    methods_disagree,
-    motion_left_out,
-    on_a_bound,
-    one_input_for_two,
-)
-from host.sysid.answer.linear_view import LinearView
 from host.sysid.checks.data_finding import open_channels
-from host.sysid.linear.linear_answer import Answer
 
 if TYPE_CHECKING:
-    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+    from host.sysid.answer.estimate_view import EstimateView
 
-Rule = Callable[[EstimateView, Evidence], list[Doubt]]
+Rule = Callable[[Any, Evidence], list[Doubt]]  # of a view
+
+
+def own(rule: Rule) -> Rule:
+    """Return a rule of a view from one that reads the answer itself."""
+    return lambda view, evidence: rule(view.answer, evidence)
 
 
 def open_finding(view: EstimateView, evidence: Evidence) -> list[Doubt]:
@@ -77,35 +69,6 @@ def impossible_sign(view: EstimateView, evidence: Evidence) -> list[Doubt]:
     ]
 
 
-def _of_linear(rule: Callable[[Answer, Evidence], list[Doubt]]) -> Rule:
-    """Return a rule that only a linear model can break."""
-    return lambda view, evidence: (
-        rule(view.answer, evidence) if isinstance(view, LinearView) else []
-    )
-
-
-def _of_coefficients(rule: Callable[[CoefficientAnswer], list[Doubt]]) -> Rule:
-    """Return a rule that only coefficients fitted directly can break."""
-    return lambda view, evidence: rule(view.answer) if isinstance(view, CoefficientView) else []
-
-
-RULES: tuple[Rule, ...] = (
-    open_finding,
-    input_feedback,
-    _of_linear(lag_unknown),
-    fit_fails,
-    not_predicted,
-    _of_linear(driven_by_inputs),
-    _of_linear(delay_at_bound),
-    _of_linear(on_a_bound),
-    impossible_sign,
-    _of_linear(methods_disagree),
-    _of_linear(one_input_for_two),
-    _of_linear(motion_left_out),
-    _of_coefficients(lag_beside),
-)
-
-
 def doubts_of(view: EstimateView, evidence: Evidence) -> list[Doubt]:
     """Return every doubt about the estimates of an answer, in the order of the rules."""
-    return [one for rule in RULES for one in rule(view, evidence)]
+    return [one for rule in view.rules for one in rule(view, evidence)]

@@ -15,15 +15,15 @@ from host.aircraft.gains import dimensional_name
 from host.aircraft.mode_names import LATERAL, LONGITUDINAL
 from host.errors import IdentificationError
 from host.files.user_text import read_toml
-from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.mat_file import labels
-from host.sysid.linear.linear_answer import Answer
-from host.sysid.linear.linear_model import AXIS_OF
+from host.sysid.linear.model_names import AXIS_OF
 from host.sysid.models.diagnostics import reference_values
-from host.sysid.models.modal_analysis import Mode
 
 if TYPE_CHECKING:
+    from host.sysid.aerodynamics.coefficient_table import CoefficientTable
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+    from host.sysid.linear.linear_answer import Answer
+    from host.sysid.models.modal_analysis import Mode
 
 
 def read_truth(path: Path) -> dict[str, Any]:

@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from host.sysid.answer.coefficient_view import CoefficientView
 from host.sysid.answer.doubt import Doubt, Evidence, reasons_by_name
-from host.sysid.answer.estimate_view import EstimateView
-from host.sysid.answer.linear_view import LinearView
+from host.sysid.answer.estimate_view import EstimateView, views_of
 from host.sysid.answer.marks import (
     CAREFUL,
     TRUSTED,
@@ -21,12 +19,12 @@ from host.sysid.answer.marks import (
 )
 from host.sysid.answer.model_agreement import disagreements_of_models
 from host.sysid.answer.trust_rules import doubts_of, input_feedback, open_finding
-from host.sysid.checks.data_finding import Finding
-from host.sysid.linear.linear_answer import Answer
 from host.sysid.reconstruction.sensor_corrections import correction_lines
 
 if TYPE_CHECKING:
+    from host.sysid.checks.data_finding import Finding
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+    from host.sysid.linear.linear_answer import Answer
 
 
 def judge(
@@ -47,9 +45,7 @@ def judge(
         Of the data checks.
     """
     evidence = Evidence(tuple(linear), tuple(findings))
-    views: list[EstimateView] = [LinearView(answer) for answer in linear]
-    if coefficients is not None:
-        views.append(CoefficientView(coefficients))
+    views = views_of(linear, coefficients)
     doubts = [doubts_of(view, evidence) for view in views]
     if coefficients is not None:
         marks = [_marks(view, own) for view, own in zip(views, doubts, strict=True)]
@@ -87,7 +83,7 @@ def verdict(
         one.name: (f"95 % half-width {share_text(one.share, view.fair)}", *one.against)
         for one in judged
     }
-    return Verdict(view.heading, marks, tuple(lines), reasons)
+    return Verdict(view.heading, marks, tuple(lines), reasons, view.fair)
 
 
 def doubted_by_findings(
@@ -105,9 +101,7 @@ def doubted_by_findings(
     set of str
         Coefficients where they were fitted directly, else derivatives of the linear models.
     """
-    views: list[EstimateView] = [LinearView(answer) for answer in linear]
-    if coefficients is not None:
-        views = [CoefficientView(coefficients)]
+    views = views_of(linear if coefficients is None else (), coefficients)
     evidence = Evidence(findings=tuple(findings))
     doubts = [rule(view, evidence) for view in views for rule in (open_finding, input_feedback)]
     return {name for some in doubts for one in some for name in one.names}

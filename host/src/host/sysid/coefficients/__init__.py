@@ -7,13 +7,16 @@ from host.faces import lazily
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+    from host.sysid.coefficients.coefficient_estimator import (
+        CoefficientAnswer,
+        CoefficientEstimator,
+    )
     from host.sysid.coefficients.coefficient_fit import CoefficientFit
-    from host.sysid.models.coefficient_model import CoefficientModel
-    from host.sysid.models.model_file import standard_model
+    from host.sysid.models.coefficient_model import CoefficientModel, standard_model
 
 __all__ = [
     "CoefficientAnswer",
+    "CoefficientEstimator",
     "CoefficientFit",
     "CoefficientModel",
     "standard_model",
@@ -23,8 +26,9 @@ __getattr__ = lazily(
     __name__,
     {
         "CoefficientAnswer": "coefficient_estimator",
+        "CoefficientEstimator": "coefficient_estimator",
         "CoefficientFit": "coefficient_fit",
-        "CoefficientModel": "coefficient_search",
-        "standard_model": "coefficient_search",
+        "CoefficientModel": ".models.coefficient_model",
+        "standard_model": ".models.coefficient_model",
     },
 )

@@ -44,10 +44,9 @@ from host.sysid.flight.reconstructed_flight import (
     maneuver_name,
 )
 from host.sysid.maneuvers.maneuver_detection import FLYING_SHARE, DetectedManeuver
-from host.sysid.models.coefficient_model import BODY, WIND, CoefficientModel
+from host.sysid.models.coefficient_model import BODY, WIND, CoefficientModel, standard_model
 from host.sysid.models.consider_covariance import dominant_error_source
 from host.sysid.models.modal_analysis import Mode
-from host.sysid.models.model_file import standard_model
 
 NAME = "coefficients"
 LEAD_S = 0.5  # of trim before a maneuver

@@ -50,8 +50,7 @@ from host.sysid.coefficients.slow_gusts import gust_information, gust_regressors
 from host.sysid.coefficients.trim_derivatives import DerivativesAtTrim
 from host.sysid.coefficients.window_spectra import ResidualSpectra, Window, residual_spectra
 from host.sysid.errors.error_list import CONSIDERED, error_kinds, errors_by_file
-from host.sysid.models.coefficient_model import CoefficientModel
-from host.sysid.models.model_file import standard_model
+from host.sysid.models.coefficient_model import CoefficientModel, standard_model
 from host.sysid.reconstruction.inverse_sensor_model import decimate, usable_length
 
 # Rounds with the coefficients alone, then with sensor errors and slow gusts.

@@ -18,7 +18,7 @@ from host.sysid.errors.one_step import one_step_of
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.nonlinear_model import NonlinearModel
+from host.sysid.models.state_space_model import has_equations
 from host.sysid.models.templates import Trim
 from host.sysid.numerics.white_noise import white_deviation
 
@@ -37,7 +37,7 @@ def column_noise(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim) -
     trim : Trim
     """
     model, none = result.model, np.zeros_like(result.covariance)
-    if not isinstance(model, NonlinearModel) or result.residual_kind != "output":
+    if not has_equations(model) or result.residual_kind != "output":
         return none
     deviation = white_deviation([m.inputs for m in maneuvers])
     deviation[: model.source.controls] = 0.0  # surfaces: `sampling_error`

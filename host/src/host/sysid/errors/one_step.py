@@ -18,7 +18,7 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
-from host.sysid.numerics.nonlinear_problem import output_problem
+from host.sysid.numerics.model_problems import output_problem
 from host.sysid.numerics.output_error_problem import OutputProblem
 
 SINGULAR = 1e-12  # of the largest eigenvalue of the scaled information

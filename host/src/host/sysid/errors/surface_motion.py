@@ -22,15 +22,15 @@ from host.errors import IdentificationError
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
 from host.sysid.errors.one_step import CERTAIN_SD, HALF_WAY, one_step_of
 from host.sysid.errors.sampling_error import HOLD
-from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators.method_fit import fit
 from host.sysid.flight.filter_step import others_recorded
-from host.sysid.flight.reconstructed_flight import FlownManeuver
+from host.sysid.flight.flown_maneuver import FlownManeuver
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
 from host.sysid.numerics.between_samples import OTHER_HOLD
-from host.sysid.numerics.nonlinear_problem import output_problem
+from host.sysid.numerics.model_problems import output_problem
 from host.sysid.numerics.output_error_problem import OutputProblem
 
 # Of what kinks do to the estimate, one deviation: a servo of second order and 60 rad/s has none,

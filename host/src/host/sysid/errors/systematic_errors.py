@@ -23,10 +23,11 @@ from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.rate_forces import by_prior, with_rate_forces
-from host.sysid.models.state_space_model import LinearModel, without_outputs
+from host.sysid.models.reduced_model import without_outputs
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import TEMPLATES, Trim, template
 from host.sysid.models.uncertainty import Uncertainty
-from host.sysid.numerics.nonlinear_problem import output_problem
+from host.sysid.numerics.model_problems import output_problem
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.reconstruction.reconstruction import Compatibility
 from host.sysid.reconstruction.sensor_corrections import (

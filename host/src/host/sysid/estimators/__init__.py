@@ -16,8 +16,9 @@ if TYPE_CHECKING:
         one_of,
         whole_number,
     )
+    from host.sysid.estimators.method_fit import fit
     from host.sysid.estimators.method_options import read_options
-    from host.sysid.estimators.method_registry import fit, methods
+    from host.sysid.estimators.method_registry import methods
     from host.sysid.estimators.regression import regression_equations
 
 __all__ = [
@@ -39,7 +40,7 @@ __getattr__ = lazily(
     {
         "Method": "estimation_method",
         "MethodOption": "estimation_method",
-        "fit": "method_registry",
+        "fit": "method_fit",
         "fit_equation_error": "equation_error",
         "methods": "method_registry",
         "number": "estimation_method",

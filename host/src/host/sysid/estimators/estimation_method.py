@@ -10,14 +10,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from host.errors import IdentificationError
-from host.files.quantities import Quantity
 from host.files.user_text import shown
-from host.sysid.models.fit_result import FitResult
+
+if TYPE_CHECKING:
+    from host.files.quantities import Quantity
+    from host.sysid.models.fit_result import FitResult
 
 Reader = Callable[[object, str], object]
 

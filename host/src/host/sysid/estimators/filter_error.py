@@ -16,14 +16,13 @@ from host.sysid.estimators.output_error_fit import fit_output_error
 from host.sysid.estimators.start_values import start_values
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.nonlinear_model import NonlinearModel
-from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.equation_filter_problem import innovation_problem, needs_compiler
+from host.sysid.models.state_space_model import LinearModel, has_equations
 from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.gauss_newton import GaussNewtonResult, damped_step, gauss_newton
 from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.innovation_problem import InnovationLikelihood, InnovationProblem
 from host.sysid.numerics.maneuver_agreement import maneuver_influence
+from host.sysid.numerics.model_problems import innovation_problem, needs_compiler
 from host.sysid.numerics.output_error import minimise
 from host.sysid.numerics.restricted_likelihood import restricted_slopes
 
@@ -193,7 +192,7 @@ def _restricted(
 
 def _driven(model: LinearModel) -> tuple[str, ...]:
     """Return the states that process noise drives where nobody says which."""
-    if isinstance(model, NonlinearModel):
+    if has_equations(model):
         return model.process_noise
     rows = {t.row for t in model.terms if t.matrix == "A"}
     return tuple(model.states[i] for i in sorted(rows))
@@ -203,7 +202,7 @@ def _first_guess(problem: InnovationProblem, start: Array | None) -> tuple[Array
     """Return where output error begins, and its estimate with its residuals split between both
     kinds of noise."""
     outputs, model = problem.output_problem, problem.model
-    if isinstance(model, NonlinearModel):
+    if has_equations(model):
         fitted = fit_output_error(
             model, problem.maneuvers, coloured_noise=False, start=start, multiple_starts=False
         )

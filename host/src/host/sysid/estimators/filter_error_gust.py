@@ -14,7 +14,7 @@ from host.sysid.estimators.gust_delays import CALM_MPS, advance_outputs, estimat
 from host.sysid.estimators.gust_model import ROLL_GUST, gust_deviation_mps, gust_model
 from host.sysid.estimators.gust_penetration import PREFIX, ROLL_STATES, with_gust_penetration
 from host.sysid.estimators.innovations import innovations_of
-from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators.method_fit import fit
 from host.sysid.estimators.noise_model_comparison import DECISIVE, bayes_criterion
 from host.sysid.estimators.output_error_fit import NO_CONVERGENCE
 from host.sysid.estimators.start_values import start_values_of

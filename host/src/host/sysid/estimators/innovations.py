@@ -12,8 +12,8 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.coloured_residuals import coloured_score_covariance
-from host.sysid.numerics.equation_filter_problem import innovation_problem
 from host.sysid.numerics.information_inverse import covariance_from_information
+from host.sysid.numerics.model_problems import innovation_problem
 
 PROCESS = "log_process."
 

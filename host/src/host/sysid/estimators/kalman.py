@@ -17,6 +17,7 @@ from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.kalman_filter import filter_with, filter_without_slopes, predicted
 from host.sysid.numerics.output_error_problem import check_shapes
 from host.sysid.numerics.sampled_model import Sampler
+from host.sysid.numerics.white_noise import noise_deviation
 
 PASSES = 2  # over the record: the second starts from the parameters of the first
 INITIAL_RELATIVE_SD = 0.5  # first standard deviation of a parameter, relative to its size
@@ -73,13 +74,6 @@ def fit_extended(
     return fit_jointly(
         "extended Kalman filter", _extended_pass, model, maneuvers, process, noise, start
     )
-
-
-def noise_deviation(maneuvers: Sequence[Maneuver]) -> Array:
-    """Return the deviation of white output noise from third differences (20 times its power)."""
-    stacked = np.vstack([np.diff(m.outputs, n=3, axis=0) for m in maneuvers])
-    floor = 1e-6 * np.max(np.abs(np.vstack([m.outputs for m in maneuvers])), axis=0) + 1e-12
-    return np.asarray(np.maximum(np.sqrt(np.mean(stacked**2, axis=0) / 20.0), floor))
 
 
 def change_by_priors(model: LinearModel, covariance: Array, began: Array) -> Array:

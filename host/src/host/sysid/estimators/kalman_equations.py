@@ -16,13 +16,13 @@ from host.sysid.estimators.kalman import (
     filter_result,
     filtered,
     measured_spread,
-    noise_deviation,
 )
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.numerics.equation_filter import EquationModel, filter_equations
 from host.sysid.numerics.nonlinear_problem import NonlinearProblem
+from host.sysid.numerics.white_noise import noise_deviation
 
 # More where parameters still move: a servo of 60 rad/s guessed at 12 stood 25 to 44 % low after two
 # passes, known to 10 to 16, and a stiffness of its equation 9 to 23 %.

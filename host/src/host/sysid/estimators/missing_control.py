@@ -19,8 +19,7 @@ from host.sysid.estimators.innovations import driven_states, score_covariances
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.nonlinear_model import NonlinearModel
-from host.sysid.models.state_space_model import LinearModel, Parameter, Term
+from host.sysid.models.state_space_model import LinearModel, Parameter, Term, has_equations
 from host.sysid.models.uncertainty import Uncertainty
 from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.information_inverse import identified_inverse
@@ -64,7 +63,7 @@ def missing_control(
     """
     base = result.model
     process = driven_states(result)
-    if not process or result.residual_kind != "innovation" or isinstance(base, NonlinearModel):
+    if not process or result.residual_kind != "innovation" or has_equations(base):
         return None
     added = _absent_entries(base)
     if not added:

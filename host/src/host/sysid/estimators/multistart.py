@@ -17,7 +17,6 @@ import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.estimators.homotopy import homotopy_start
-from host.sysid.estimators.kalman import noise_deviation
 from host.sysid.estimators.regression import (
     RegressionEquation,
     regression_equations,
@@ -25,11 +24,11 @@ from host.sysid.estimators.regression import (
 )
 from host.sysid.models.diagnostics import CONDITION_LIMIT
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.nonlinear_problem import NonlinearProblem
+from host.sysid.models.state_space_model import LinearModel, has_equations
 from host.sysid.numerics.output_error import Optimum, minimise
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.recursion import simulate
+from host.sysid.numerics.white_noise import noise_deviation
 
 HOMOTOPY_GAINS_RADPS = ((2.0, 0.5), (6.0, 1.5, 0.4))  # falling feedback gains, one search each
 CORNERS_RADPS = (0.5, 2.0, 6.0, 20.0)  # of the filter: slow to fast motion of small aircraft
@@ -68,7 +67,7 @@ def multistart(
     IdentificationError
         If no start is finite over the maneuvers.
     """
-    if isinstance(problem, NonlinearProblem):
+    if has_equations(problem.model):
         reached = minimise(problem, theta, max_iterations=LAST_SEARCH_ITERATIONS)
         return _with_other_delays(problem, reached)
     if not restarts:
@@ -99,7 +98,7 @@ def multistart(
     return best
 
 
-def _with_other_delays(problem: NonlinearProblem, best: Optimum) -> Optimum:
+def _with_other_delays(problem: OutputProblem, best: Optimum) -> Optimum:
     """Return the best optimum whose controls are samples earlier or later than those of `best`.
 
     Each whole sample bends the cost over a delay, and a quicker servo makes up for a part of it.

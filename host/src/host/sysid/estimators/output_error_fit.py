@@ -21,7 +21,7 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.coloured_residuals import coloured_score_covariance
 from host.sysid.numerics.maneuver_agreement import maneuver_influence
-from host.sysid.numerics.nonlinear_problem import output_problem
+from host.sysid.numerics.model_problems import output_problem
 from host.sysid.numerics.output_error import unidentifiable_covariance, whitened_sensitivities
 from host.sysid.numerics.output_error_problem import OutputProblem
 

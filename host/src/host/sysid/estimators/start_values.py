@@ -11,8 +11,8 @@ from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.estimators.regression import regression_equations, solve_least_squares
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.nonlinear_problem import NonlinearProblem, output_problem
+from host.sysid.models.state_space_model import LinearModel, has_equations
+from host.sysid.numerics.model_problems import output_problem
 from host.sysid.numerics.output_error_problem import OutputProblem
 
 
@@ -24,7 +24,7 @@ def start_values(problem: OutputProblem) -> Array:
     values are used.
     """
     theta = problem.first_guess()
-    if isinstance(problem, NonlinearProblem):
+    if has_equations(problem.model):
         return np.asarray(np.clip(theta, problem.lower, problem.upper), dtype=np.float64)
     estimates = regression_estimates(problem.model, problem.maneuvers)
     better = np.array(

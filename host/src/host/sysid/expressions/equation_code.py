@@ -7,15 +7,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import FunctionType, ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from host.arrays import Array
 from host.compiled import Kernel, generated_source
 from host.sysid.expressions.derivative import derivatives
 from host.sysid.expressions.emission import HEADER, function_text
-from host.sysid.expressions.expression_graph import ExpressionGraph
+
+if TYPE_CHECKING:
+    from host.arrays import Array
+    from host.sysid.expressions.expression_graph import ExpressionGraph
 
 GIVEN = ("x", "u", "p", "c", "t")  # states, inputs, parameters, constants, tables
 FUNCTIONS = ("rates", "rate_slopes", "readings", "reading_slopes")

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from host.sysid.flight.filter_step import with_filter_step
     from host.sysid.flight.flight_selection import chosen_flights
     from host.sysid.flight.flight_tables import FlightColumns, read_columns, read_flight_columns
+    from host.sysid.flight.flown_maneuver import FlownManeuver, flown_maneuvers
     from host.sysid.flight.reconstructed_flight import (
-        FlownManeuver,
         ReconstructedFlight,
         maneuver_name,
         reconstruct_flight,
@@ -25,6 +25,7 @@ __all__ = [
     "ReconstructedFlight",
     "changed_columns",
     "chosen_flights",
+    "flown_maneuvers",
     "maneuver_name",
     "read_columns",
     "read_flight_columns",
@@ -37,10 +38,11 @@ __getattr__ = lazily(
     {
         "ColumnChange": "column_change",
         "FlightColumns": "flight_tables",
-        "FlownManeuver": "reconstructed_flight",
+        "FlownManeuver": "flown_maneuver",
         "ReconstructedFlight": "reconstructed_flight",
         "changed_columns": "column_change",
         "chosen_flights": "flight_selection",
+        "flown_maneuvers": "flown_maneuver",
         "maneuver_name": "reconstructed_flight",
         "read_columns": "flight_tables",
         "read_flight_columns": "flight_tables",

@@ -22,7 +22,7 @@ from dataclasses import replace
 from host.physical.recording import FOREIGN
 from host.readers.column_sampling import sampled_name
 from host.sysid.estimators.gust_penetration import ROLL_STATES
-from host.sysid.flight.reconstructed_flight import FlownManeuver
+from host.sysid.flight.flown_maneuver import FlownManeuver
 from host.sysid.models.state_space_model import LinearModel
 
 ROLL_RATE = "p_radps"

@@ -10,11 +10,8 @@ import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.checks.small_inputs import free_motion
-from host.sysid.flight.reconstructed_flight import (
-    FlownManeuver,
-    ReconstructedFlight,
-    flown_maneuvers,
-)
+from host.sysid.flight.flown_maneuver import FlownManeuver, flown_maneuvers
+from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.maneuvers.maneuver_grade import grade
 from host.sysid.maneuvers.maneuver_selection import HELD_OUT_FROM, SURFACES, joined_windows

@@ -8,9 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from host.arrays import Array
 from host.errors import IdentificationError
@@ -20,29 +18,24 @@ from host.physical.recording import Recording
 from host.readers.autopilot_flight import is_autopilot_log
 from host.readers.autopilot_table import autopilot_table
 from host.readers.column_map import Line, listed, mapped, missing_lines, read_map
-from host.readers.column_sampling import Sampling
 from host.readers.derived_columns import derived_columns
-from host.readers.even_grid import FITTED, LONGEST_GAP_S, USED, even_grid, rows_in_order
+from host.readers.even_grid import FITTED, USED, even_grid
 from host.readers.flight_choice import file_and_flight
 from host.readers.foreign_tables import (
     TEXT_KINDS,
     Foreign,
     from_frame,
-    is_text,
     leave_infinities_out,
     read_foreign,
     same_length,
 )
 from host.readers.original_table import is_original, original_table
 from host.readers.readable_file import readable_file
-from host.readers.recorded import commanded_by_map, recording_of_log, recording_of_table
-from host.readers.table_clock import counted_on, evenly_timed, one_recording
+from host.readers.recorded import commanded_by_map, recording_of_table
 from host.sysid.checks.data_finding import Finding
-from host.sysid.checks.finding_consequences import checked
-from host.sysid.checks.measured import Measured, measured
 from host.sysid.checks.unit_sign_checks import SURFACES
+from host.sysid.flight.log_columns import columns_of, of_log, recorded_log
 from host.sysid.maneuvers.logged_inputs import input_columns
-from host.terminal import command_line
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -143,27 +136,24 @@ def read_flight_columns(
         wanted = (*wanted, *(name for name in lines if name not in wanted))
     used = {k: raw[k] for k in wanted if k in raw}
     theirs = {name: line.foreign for name, line in lines.items()}
-    _refuse_unusable(used, found, theirs, source_name(source))
+    called = source_name(source)
+    _refuse_unusable(used, found, theirs, called)
     notes += _remarks(used, found.remarks, theirs)
     if recorded:
         columns = even_grid(used, notes)
         columns |= input_columns(columns["t_s"], found.inputs)
         columns |= derived_columns(columns, wanted)
         return FlightColumns(columns, notes, found.recording, found.calibration)
-    timing: list[Finding] = []
-    if not found.shares:  # a table: an autopilot's log is read clock by clock
-        used = _timed(used, source, notes, timing, accept)
-    seen = _measured(used, notes, accept)
-    even = even_grid(seen.columns, notes)
-    columns, findings = checked(even, accept)
-    columns = columns | derived_columns(columns, wanted)
+    from host.sysid.flight.table_columns import table_columns  # checks that our log needs not
+
+    columns, findings, resolution = table_columns(used, found, source, called, accept)
     return FlightColumns(
-        columns,
+        columns | derived_columns(columns, wanted),
         notes,
         found.recording,
         found.calibration,
-        [*timing, *_slow_outputs(found.slow_outputs), *seen.findings, *findings],
-        _resolutions(seen.sampling, even, columns),
+        findings,
+        resolution,
         tuple(s for s in found.shares if f"{s}_rad" not in lines),
     )
 
@@ -203,71 +193,6 @@ def _refuse_unusable(
     same_length(used, called)
 
 
-def _timed(
-    columns: dict[str, Array],
-    source: Any,
-    notes: list[str],
-    findings: list[Finding],
-    accept: Collection[str],
-) -> dict[str, Array]:
-    """Return the rows of one recording with times that go on, and a finding where they were made
-    even."""
-    flight = file_and_flight(source)[1] if isinstance(source, Path) else None
-    columns = columns | {"t_s": counted_on(columns["t_s"], notes)}
-    columns = one_recording(columns, flight, source_name(source), notes)
-    even = evenly_timed(columns)
-    if even is None:
-        return columns
-    t_s, digit_s = even
-    rate_hz = 1.0 / float(t_s[1] - t_s[0])
-    found = Finding(
-        "time-digits",
-        (),
-        f"t_s has digits of {digit_s:.3g} s where rows come at {rate_hz:.4g} Hz",
-        ("a time that was written with too few digits",),
-        done="rows are timed evenly, which agrees with every digit",
-    ).accepted_if(accept)
-    findings.append(found)
-    return columns if found.accepted else columns | {"t_s": t_s}
-
-
-def _measured(columns: dict[str, Array], notes: list[str], accept: Collection[str]) -> Measured:
-    """Return the rows that are used, in order, what was not measured as missing, and findings."""
-    index = rows_in_order(columns["t_s"], notes)
-    found = measured({k: v[index] for k, v in columns.items()}, SENSORS, LONGEST_GAP_S, accept)
-    notes += found.notes
-    return found
-
-
-def _slow_outputs(rates_hz: Mapping[str, float]) -> list[Finding]:
-    """Return a finding where a surface may have moved between two records of its output."""
-    if not rates_hz:
-        return []
-    rates = ", ".join(f"{name} {rate:.0f} Hz" for name, rate in rates_hz.items())
-    return [
-        Finding(
-            "surface-rate",
-            tuple(f"{name}_rad" for name in rates_hz),
-            f"outputs are logged more slowly than servos get them ({rates}): when a surface moved"
-            " is known to a part of a step only",
-            ("a logging profile that writes outputs rarely", "a log received by radio"),
-            done="what lies between two records is drawn on a curve through four",
-        )
-    ]
-
-
-def _resolutions(
-    sampling: Mapping[str, Sampling], even: Mapping[str, Array], used: Mapping[str, Array]
-) -> dict[str, float]:
-    """Return the step of each quantised column, in the unit in which the column is used."""
-    found = {}
-    for name, own in sampling.items():
-        if own.step > 0.0 and name in used:
-            span = float(np.ptp(even[name]))
-            found[name] = own.step * float(np.ptp(used[name])) / span if span else own.step
-    return found
-
-
 def source_name(source: str | Path | FlightLog | pd.DataFrame) -> str:
     """Return the name of a source in an answer: where it was read from, or ``table``."""
     if isinstance(source, str | Path):
@@ -287,8 +212,8 @@ def _read(
     from host.log import FlightLog
 
     if isinstance(source, FlightLog):
-        columns, notes = _columns_of(source, wanted)
-        return _of_log(source, columns, notes), True
+        columns, notes = columns_of(source, wanted)
+        return of_log(source, columns, notes), True
     if not isinstance(source, Path):
         found = from_frame(_with_its_index(source))
         found.recording = recording_of_table(found.columns, source.attrs)
@@ -305,7 +230,7 @@ def _read(
             return original_table(source, calibration, row_rate_hz), False
         kind = source.suffix.lower()
         if kind not in READ or (kind in TEXT_KINDS[1:] and mapping is None):  # original rows
-            log = _recorded(source, calibration, wanted, flight, maybe_table=kind != ".bin")
+            log = recorded_log(source, calibration, wanted, flight, maybe_table=kind != ".bin")
             if log is not None:
                 return log, True
         found = read_foreign(source)
@@ -320,84 +245,3 @@ def _with_its_index(table: pd.DataFrame) -> pd.DataFrame:
     import pandas as pd
 
     return table if isinstance(table.index, pd.RangeIndex) else table.reset_index()
-
-
-def _recorded(
-    source: Path,
-    calibration: Path | None,
-    wanted: Collection[str],
-    session: int | None,
-    *,
-    maybe_table: bool,
-) -> Foreign | None:
-    """Return the columns of a log; None if it is none but may be a table of text."""
-    from host.errors import NotALogError
-
-    try:
-        return _log(source, calibration, wanted, session)
-    except NotALogError:
-        if maybe_table and source.is_file() and is_text(source):
-            return None
-        raise
-
-
-def _log(
-    source: Path, calibration: Path | None, wanted: Collection[str], session: int | None
-) -> Foreign:
-    from host.log import read_log
-    from host.log.source import find_flights, newest
-
-    notes: list[str] = []
-    if source.is_dir():
-        flights = find_flights(source)
-        source = newest(source, flights).path
-        if len(flights) > 1:
-            notes.append(f"{source.name} is the newest of {len(flights)} logs in the folder")
-    log = read_log(source, session=session, calibration=calibration)
-    raw, found = _columns_of(log, wanted)
-    lost = 0 if log.complete == "complete" else 1  # what is lost is said first
-    notes = [*found[:lost], *notes, *found[lost:]]
-    return _of_log(log, raw, notes)
-
-
-def _of_log(log: FlightLog, columns: dict[str, Array], notes: list[str]) -> Foreign:
-    from host.log.flown_inputs import flown_inputs
-
-    return Foreign(
-        columns,
-        notes=notes,
-        recording=recording_of_log(log),
-        calibration=log.calibration,
-        inputs=flown_inputs(log),
-    )
-
-
-def _columns_of(log: FlightLog, wanted: Collection[str]) -> tuple[dict[str, Array], list[str]]:
-    """Return the columns of a log, and what is lost, uncalibrated or only commanded of them."""
-    from host.log.calibration_note import calibration_note
-
-    notes: list[str] = []
-    raw: dict[str, Array] = {
-        k: np.asarray(v, dtype=np.float64) for k, v in log.columns().items() if k in wanted
-    }
-    if not len(raw.get("t_s", ())):
-        look = command_line("host", "info", log.path)
-        raise IdentificationError(
-            f"{log.path}: nothing was recorded in it; `{look}` says what it is"
-        )
-    if log.complete != "complete":
-        loss = log.loss
-        lost = f"{loss.seconds:.2f} s and {loss.lost_bytes} bytes lost" if loss.any else ""
-        said = "; ".join(filter(None, (lost, loss.ending)))
-        notes.append(f"the log is {log.complete}: {said} (`host decode` names every place)")
-    poor_columns = [c for c in calibration_note(log)["default_columns"] if c in USED]
-    if poor_columns:
-        notes.append(
-            "default calibration, not this instrument's own, under: "
-            + ", ".join(poor_columns)
-            + "; its deviations are those of sensors out of the box, and so are the intervals"
-        )
-    poor = [f"{name} {how}" for name, how in log.inputs.items() if how != "measured"]
-    if poor:
-        notes.append(f"control inputs: {', '.join(poor)}")
-    return raw, notes

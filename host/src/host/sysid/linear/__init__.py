@@ -9,8 +9,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from host.sysid.linear.linear_answer import Answer
     from host.sysid.linear.linear_estimator import LinearEstimator
-    from host.sysid.linear.linear_model import AXIS_OF, DEFAULT_METHOD, STAGED
     from host.sysid.linear.linear_stages import LinearEstimate
+    from host.sysid.linear.model_names import AXIS_OF, DEFAULT_METHOD, STAGED
 
 __all__ = [
     "AXIS_OF",
@@ -24,9 +24,9 @@ __all__ = [
 __getattr__ = lazily(
     __name__,
     {
-        "AXIS_OF": "linear_model",
-        "DEFAULT_METHOD": "linear_model",
-        "STAGED": "linear_model",
+        "AXIS_OF": "model_names",
+        "DEFAULT_METHOD": "model_names",
+        "STAGED": "model_names",
         "Answer": "linear_answer",
         "LinearEstimate": "linear_stages",
         "LinearEstimator": "linear_estimator",

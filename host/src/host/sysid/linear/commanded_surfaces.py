@@ -9,7 +9,7 @@ from dataclasses import replace
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.estimators.filter_error_gust import fit_gust_state
-from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators.method_fit import fit
 from host.sysid.estimators.servo_parameters import (
     CoarseDelays,
     Fit,
@@ -18,7 +18,8 @@ from host.sysid.estimators.servo_parameters import (
     estimate_servo,
 )
 from host.sysid.estimators.start_values import start_values_of
-from host.sysid.flight.reconstructed_flight import FlownManeuver, ReconstructedFlight
+from host.sysid.flight.flown_maneuver import FlownManeuver
+from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.linear.first_departures import remove_departures
 from host.sysid.linear.linear_model import ChosenModel
 from host.sysid.models.fit_result import FitResult

@@ -19,7 +19,7 @@ from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.errors.trim_departure import correct_trim_departure, spin_of
 from host.sysid.estimators.gust_model import VANES
-from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators.method_fit import fit
 from host.sysid.linear.linear_model import ChosenModel
 from host.sysid.models.maneuver import Maneuver
 

@@ -21,12 +21,13 @@ from host.sysid.estimators.filter_error_gust import fit_with_gust
 from host.sysid.estimators.gust_delays import CALM_MPS, advance_outputs
 from host.sysid.estimators.gust_model import gust_deviation_mps
 from host.sysid.estimators.gust_penetration import penetration_of
-from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators.method_fit import fit
 from host.sysid.estimators.noise_model_comparison import DECISIVE, bayes_criterion
-from host.sysid.estimators.users_model import no_filter, no_gust_state
-from host.sysid.linear.linear_model import DEFAULT_METHOD, GUST, ChosenModel
+from host.sysid.linear.linear_model import ChosenModel
 from host.sysid.linear.linear_stages import LinearFit
+from host.sysid.linear.model_names import DEFAULT_METHOD, GUST
 from host.sysid.linear.prepared_columns import PreparedColumns
+from host.sysid.linear.users_model import no_filter, no_gust_state
 from host.sysid.models.fit_result import FitResult, without_parameters
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel

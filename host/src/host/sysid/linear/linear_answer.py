@@ -3,34 +3,37 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.aircraft.mass_properties import Condition
-from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import (
     Coefficient,
     CoefficientParts,
     CoefficientTable,
 )
-from host.sysid.estimators.servo_parameters import ServoEstimate
-from host.sysid.flight.column_change import Record
-from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
-from host.sysid.models.diagnostics import (
-    Collinearity,
-    IdentifiabilityFlag,
-    SignalFit,
-)
-from host.sysid.models.fit_result import FitResult
-from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.residual_delays import STANDARD_DELAYS
-from host.sysid.models.state_space_model import DelayGroup, LinearModel
-from host.sysid.models.templates import Trim
-from host.sysid.models.thrust_column import ThrustColumn
-from host.sysid.numerics.input_coherence import InputCoherence
-from host.sysid.reconstruction.sensor_corrections import Correction
-from host.sysid.validation.prediction_limits import Prediction
+
+if TYPE_CHECKING:
+    from host.aircraft.mass_properties import Condition
+    from host.arrays import Array
+    from host.sysid.estimators.servo_parameters import ServoEstimate
+    from host.sysid.flight.column_change import Record
+    from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
+    from host.sysid.models.diagnostics import (
+        Collinearity,
+        IdentifiabilityFlag,
+        SignalFit,
+    )
+    from host.sysid.models.fit_result import FitResult
+    from host.sysid.models.maneuver import Maneuver
+    from host.sysid.models.modal_analysis import Mode
+    from host.sysid.models.state_space_model import DelayGroup, LinearModel
+    from host.sysid.models.templates import Trim
+    from host.sysid.models.thrust_column import ThrustColumn
+    from host.sysid.numerics.input_coherence import InputCoherence
+    from host.sysid.reconstruction.sensor_corrections import Correction
+    from host.sysid.validation.prediction_limits import Prediction
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,10 @@ from host.sysid.linear.left_out_motion import unaccounted_motion
 from host.sysid.linear.linear_answer import Answer
 from host.sysid.linear.linear_fit import changes_of, departure_of, fit_columns
 from host.sysid.linear.linear_intervals import linear_intervals
-from host.sysid.linear.linear_model import DEFAULT_METHOD, GUST, choose_model, standard_delays
+from host.sysid.linear.linear_model import choose_model, standard_delays
 from host.sysid.linear.linear_stages import LinearEstimate, LinearIntervals, LinearValidation
 from host.sysid.linear.linear_validation import linear_validation
+from host.sysid.linear.model_names import DEFAULT_METHOD, GUST
 from host.sysid.linear.prepared_columns import prepare_columns
 from host.sysid.models.diagnostics import assess_identifiability, collinearity, constant_inputs
 from host.sysid.models.fit_result import without_parameters

@@ -13,15 +13,15 @@ from dataclasses import replace
 from host.arrays import Array
 from host.sysid.errors.departure import Departure
 from host.sysid.errors.trim_departure import correct_trim_departure
-from host.sysid.estimators.method_registry import fit, refuse_unless_finite
-from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
+from host.sysid.estimators.method_fit import fit, refuse_unless_finite
 from host.sysid.flight.column_change import ColumnChange, Record
 from host.sysid.linear.first_departures import remove_departures
 from host.sysid.linear.gust_at_trim import fit_gust_at_trim
 from host.sysid.linear.left_out_motion import fit_beside_left_out
-from host.sysid.linear.linear_model import DEFAULT_METHOD, GUST
 from host.sysid.linear.linear_stages import LinearFit
+from host.sysid.linear.model_names import DEFAULT_METHOD, GUST
 from host.sysid.linear.prepared_columns import PreparedColumns
+from host.sysid.linear.users_model import fit_by_evidence, fit_users_model
 from host.sysid.models.maneuver import Maneuver
 
 OUTPUT_ERROR = "output-error"  # begins the names of its methods
@@ -91,15 +91,9 @@ def _users(columns: PreparedColumns, options: Mapping[str, object]) -> LinearFit
     """Fit a user's model by the method asked for, or by the one for the noise that data show."""
     chosen = columns.chosen
     speed = chosen.trim.airspeed_mps if chosen.trim.known else None
-    by = (
-        fit_by_evidence(chosen.model, columns.data, speed)
-        if chosen.method == DEFAULT_METHOD
-        else fit_users_model(chosen.method, chosen.model, columns.data, speed, options)
-    )
-    return LinearFit(
-        by.result, by.result.model, by.method, by.maneuvers, by.result.fitted,
-        delays=by.delays, remarks=by.remarks,
-    )  # fmt: skip
+    if chosen.method == DEFAULT_METHOD:
+        return fit_by_evidence(chosen.model, columns.data, speed)
+    return fit_users_model(chosen.method, chosen.model, columns.data, speed, options)
 
 
 def _template(columns: PreparedColumns, options: Mapping[str, object]) -> LinearFit:

@@ -12,7 +12,6 @@ from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, deviations, unknown_sensors
 from host.physical.recording import OWN
 from host.sysid.aerodynamics.coefficient_table import trim_of
-from host.sysid.checks.hidden_angles import without_vanes
 from host.sysid.estimators.gust_model import VANES
 from host.sysid.estimators.method_registry import find_method
 from host.sysid.estimators.start_values import regression_estimates
@@ -22,37 +21,23 @@ from host.sysid.flight.filter_step import (
     rolling_gust_identifiable,
 )
 from host.sysid.flight.fitted_maneuvers import columns_of, fitted_and_held_out
-from host.sysid.flight.reconstructed_flight import FlownManeuver, ReconstructedFlight
+from host.sysid.flight.flown_maneuver import FlownManeuver
+from host.sysid.flight.reconstructed_flight import ReconstructedFlight
+from host.sysid.linear.model_names import AXIS_OF, DEFAULT_METHOD, GUST, STAGED
+from host.sysid.linear.unmeasured_angles import without_vanes
 from host.sysid.maneuvers.maneuver_selection import excited_axes
 from host.sysid.models.rate_forces import with_rate_forces
+from host.sysid.models.reduced_model import without_inputs, without_outputs
 from host.sysid.models.residual_delays import (
     OTHERS_DELAYS,
     STANDARD_DELAYS,
     without_standard_delays,
 )
-from host.sysid.models.state_space_model import (
-    DelayGroup,
-    LinearModel,
-    without_inputs,
-    without_outputs,
-)
+from host.sysid.models.state_space_model import DelayGroup, LinearModel
 from host.sysid.models.templates import TEMPLATES, Trim, template
-from host.sysid.numerics.equation_filter_problem import needs_compiler
+from host.sysid.numerics.model_problems import needs_compiler
 from host.sysid.reconstruction.path_preparation import NO_OFFSETS
 
-AXIS_OF = {
-    "longitudinal": ("elevator_rad",),
-    "short-period": ("elevator_rad",),
-    "phugoid": ("elevator_rad",),
-    "lateral": ("aileron_rad", "rudder_rad"),
-    "roll": ("aileron_rad",),
-    "dutch-roll": ("rudder_rad",),
-}
-# Output error takes turbulence for sensor noise. Simulated flights of the demonstration card, error
-# of Cm_alpha, Cm_q, Cm_de: 5, 10, 7 % by white output error, 2, 3, 3 % with the gust as a state.
-# Laterally, rms over eight flights: L_p 5.4, L_da 4.5, N_dr 5.6 % and 2.6, 3.2, 1.3 %.
-GUST = "filter-error-gust"
-DEFAULT_METHOD = "flight"
 NO_AIRSPEED = (
     "the data have no airspeed_mps: it is taken as constant; accelerations, gusts and coefficients"
     " need it and are left out"
@@ -62,11 +47,6 @@ NO_AIRSPEED = (
 DOUBTFUL = {"ay_mps2"}
 SIDE_FORCE_DOUBTED = "ay_mps2 has an open finding, and is left out of the fit"
 STILL_RAD = 1e-9  # a surface that moves less stands still but for rounding
-STAGED = {
-    "flight": "gust filter where alpha is a measured state; beta too, of our log only with an"
-    " aircraft file, of dutch-roll where the data show gusts (default)",
-    GUST: "filter error with the gust as a state, delays estimated beside it",
-}
 
 
 @dataclass(frozen=True)

@@ -25,10 +25,11 @@ from host.sysid.errors.trim_departure import NO_SPIN, spin_of
 from host.sysid.estimators.servo_parameters import ServoEstimate
 from host.sysid.flight.column_change import ColumnChange, Record, changed_columns
 from host.sysid.flight.filter_step import STEP_S, with_filter_step
-from host.sysid.flight.reconstructed_flight import FlownManeuver
+from host.sysid.flight.flown_maneuver import FlownManeuver
 from host.sysid.linear.commanded_surfaces import brought_behind, servo_of
 from host.sysid.linear.first_departures import first_departures
-from host.sysid.linear.linear_model import GUST, ChosenModel
+from host.sysid.linear.linear_model import ChosenModel
+from host.sysid.linear.model_names import GUST
 from host.sysid.models.maneuver import Maneuver
 
 

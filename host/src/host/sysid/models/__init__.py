@@ -7,12 +7,13 @@ from host.faces import lazily
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from host.sysid.models.all_free import free_model
     from host.sysid.models.equation_file import equations_from
     from host.sysid.models.fit_result import FitResult
     from host.sysid.models.maneuver import Maneuver
     from host.sysid.models.model_file import model_from, read_model
     from host.sysid.models.nonlinear_model import NonlinearModel
-    from host.sysid.models.state_space_model import LinearModel, Parameter, Term, free_model
+    from host.sysid.models.state_space_model import LinearModel, Parameter, Term
     from host.sysid.models.templates import Trim, template
 
 __all__ = [
@@ -41,7 +42,7 @@ __getattr__ = lazily(
         "Term": "state_space_model",
         "Trim": "templates",
         "equations_from": "equation_file",
-        "free_model": "state_space_model",
+        "free_model": "all_free",
         "model_from": "model_file",
         "read_model": "model_file",
         "template": "templates",

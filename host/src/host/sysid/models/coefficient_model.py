@@ -9,12 +9,14 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from host.arrays import Array
 from host.errors import IdentificationError
+from host.files.user_text import read_toml
 
 SIGNALS = ("alpha", "beta", "p", "q", "r", "de", "da", "dr", "V")
 LIFT = "CL"  # as a regressor: of the drag polar
@@ -173,3 +175,10 @@ def parse_term(text: str, row: str, where: str) -> CoefficientTerm:
     if any(f[0] == LIFT for f in factors) and (row != "CD" or factors != ((LIFT, 2, False),)):
         raise IdentificationError(f"{where}: '{text}': lift stands in CD only, as CL^2")
     return CoefficientTerm(factors)
+
+
+@cache
+def standard_model() -> CoefficientModel:
+    """Return the terms of coefficients that are used when none are given."""
+    path = Path(__file__).with_name("standard_coefficients.toml")
+    return coefficients_from(read_toml(path, IdentificationError), str(path))

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from host.aircraft.mode_names import DUTCH_ROLL, LONGITUDINAL, ROLL, ROLL_SPIRAL, SPIRAL
-from host.arrays import Array
 from host.constants import NORMAL_95
-from host.sysid.models.fit_result import FitResult
-from host.sysid.models.state_space_model import LinearModel
+
+if TYPE_CHECKING:
+    from host.arrays import Array
+    from host.sysid.models.fit_result import FitResult
+    from host.sysid.models.state_space_model import LinearModel
 
 PAIR, ROOT = "oscillatory mode", "real mode"  # where a mode has no name of its own
 REAL_LIMIT = 1e-9  # relative imaginary part below which an eigenvalue is called real

@@ -40,7 +40,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from functools import cache
 from pathlib import Path
 from typing import Literal, overload
 
@@ -133,14 +132,6 @@ def read_model(path: Path, *, of_coefficients: bool = False) -> LinearModel | Co
                 f'{path}: [{key}] are of {meant}; write kind = "{meant}" above'
             )
     return model_from(document, str(path))
-
-
-@cache
-def standard_model() -> CoefficientModel:
-    """Return the terms of coefficients that are used when none are given."""
-    model = read_model(Path(__file__).with_name("standard_coefficients.toml"), of_coefficients=True)
-    assert isinstance(model, CoefficientModel)
-    return model
 
 
 def read_trim(path: Path) -> Trim:

@@ -10,8 +10,7 @@ from host.export.toml import toml_number, toml_value
 from host.sysid.models.equation_text import delay_lines, equation_text
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.model_constants import OWN
-from host.sysid.models.nonlinear_model import NonlinearModel
-from host.sysid.models.state_space_model import MATRICES, LinearModel
+from host.sysid.models.state_space_model import MATRICES, LinearModel, has_equations
 from host.sysid.models.templates import Trim
 from host.sysid.models.thrust_column import ThrustColumn
 
@@ -35,7 +34,7 @@ def model_text(
     thrust : ThrustColumn, optional
         Gives a [thrust] table: what measured thrust does beside the model.
     """
-    if isinstance(model, NonlinearModel):
+    if has_equations(model):
         return equation_text(model, result)
     lines = [f"name = {toml_value(model.name)}"]
     for key in ("states", "inputs", "outputs"):

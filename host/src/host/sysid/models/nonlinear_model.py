@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 
@@ -243,6 +244,8 @@ class NonlinearModel(LinearModel):
     smooth : bool
         Controls move smoothly between samples, which lines with the mean of that motion stand for.
     """
+
+    of_equations: ClassVar[bool] = True
 
     equations: Equations | None = None
     own_parameters: tuple[Parameter, ...] = ()

@@ -9,14 +9,17 @@ speed). Biases b and c and the initial state x0 belong to one maneuver; everythi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import TYPE_CHECKING, ClassVar, TypeGuard
 
 import numpy as np
 
 from host.arrays import Array, IntArray
 from host.errors import IdentificationError
+
+if TYPE_CHECKING:
+    from host.sysid.models.nonlinear_model import NonlinearModel
 
 MATRICES = ("A", "B", "C", "D")
 CONSTANT = "one"  # an input that is 1 at every sample: its entries are constants of all records
@@ -145,6 +148,8 @@ class LinearModel:
         If shapes, names or indices disagree.
     """
 
+    of_equations: ClassVar[bool] = False  # of a user, in place of constant matrices
+
     name: str
     states: tuple[str, ...]
     inputs: tuple[str, ...]
@@ -245,6 +250,10 @@ class LinearModel:
         """Return the units of parameters of which the user states them."""
         return {p.name: p.unit for p in self.parameters if p.unit}
 
+    def signals(self) -> tuple[str, ...]:
+        """Return the inputs and outputs that columns give: all but the constant."""
+        return tuple(s for s in (*self.inputs, *self.outputs) if s != CONSTANT)
+
     def controls(self) -> tuple[str, ...]:
         """Return the inputs that a pilot moves."""
         return self.inputs
@@ -331,107 +340,6 @@ class LinearModel:
         return np.array([self.outputs.index(s) for s in self.states], dtype=np.int64)
 
 
-def free_model(
-    name: str,
-    states: Sequence[str],
-    inputs: Sequence[str],
-    *,
-    start_A: Array | None = None,
-    start_B: Array | None = None,
-    **options: tuple[str, ...] | str,
-) -> LinearModel:
-    """Build the model of the original program: every entry of A and B free, states measured.
-
-    Parameters
-    ----------
-    name : str
-        Model name.
-    states, inputs : sequence of str
-        Signal names.
-    start_A, start_B : Array, optional
-        Start values; zero without.
-    **options
-        `state_biases`, `initial_states`, `hold` ... of `LinearModel`.
-    """
-    n, m = len(states), len(inputs)
-    A0 = np.zeros((n, n)) if start_A is None else np.asarray(start_A, dtype=np.float64)
-    B0 = np.zeros((n, m)) if start_B is None else np.asarray(start_B, dtype=np.float64)
-    parameters, terms = [], []
-    for matrix, start, columns in (("A", A0, n), ("B", B0, m)):
-        for row in range(n):
-            for column in range(columns):
-                label = f"{matrix.lower()}{row + 1}{column + 1}"
-                parameters.append(Parameter(label, float(start[row, column])))
-                terms.append(Term(matrix, row, column, label))
-    settings: dict[str, tuple[str, ...] | str] = {"initial_states": tuple(states), **options}
-    return LinearModel(
-        name=name,
-        states=tuple(states),
-        inputs=tuple(inputs),
-        outputs=tuple(states),
-        A=np.zeros((n, n)),
-        B=np.zeros((n, m)),
-        C=np.eye(n),
-        D=np.zeros((n, m)),
-        terms=tuple(terms),
-        parameters=tuple(parameters),
-        state_biases=_names(settings.get("state_biases", ())),
-        output_biases=_names(settings.get("output_biases", ())),
-        initial_states=_names(settings["initial_states"]),
-        hold=str(settings.get("hold", "zoh")),
-    )
-
-
-def _kept(
-    terms: Sequence[Term], matrices: str, along: Literal["row", "column"], keep: Sequence[int]
-) -> Iterator[Term]:
-    """Return the entries that stay where of two matrices these rows or columns are kept."""
-    for term in terms:
-        old = term.row if along == "row" else term.column
-        if term.matrix not in matrices:
-            yield term
-        elif old in keep:
-            new = keep.index(old)
-            yield replace(term, row=new) if along == "row" else replace(term, column=new)
-
-
-def without_outputs(model: LinearModel, names: Sequence[str]) -> LinearModel:
-    """Return a model without some of its outputs; delays without outputs are removed too."""
-    keep = [k for k, y in enumerate(model.outputs) if y not in names]
-    delays = [
-        replace(d, outputs=tuple(y for y in d.outputs if y not in names)) for d in model.delays
-    ]
-    placed = tuple(x for x in model.accelerometer_offsets if x.output not in names)
-    lost = {x.parameter for x in model.accelerometer_offsets} - {x.parameter for x in placed}
-    return replace(
-        model,
-        outputs=tuple(model.outputs[k] for k in keep),
-        C=model.C[keep],
-        D=model.D[keep],
-        terms=tuple(_kept(model.terms, "CD", "row", keep)),
-        parameters=tuple(p for p in model.parameters if p.name not in lost),
-        output_biases=tuple(y for y in model.output_biases if y not in names),
-        known_noise=tuple((y, sd) for y, sd in model.known_noise if y not in names),
-        delays=tuple(d for d in delays if d.outputs),
-        accelerometer_offsets=placed,
-    )
-
-
-def without_inputs(model: LinearModel, names: Sequence[str]) -> LinearModel:
-    """Return a model without some of its inputs and the parameters that only these have."""
-    keep = [k for k, u in enumerate(model.inputs) if u not in names]
-    terms = tuple(_kept(model.terms, "BD", "column", keep))
-    left = {t.parameter for t in terms} | {x.parameter for x in model.accelerometer_offsets}
-    left |= {parameter for _, parameter in model.shared_starts}
-    return replace(
-        model,
-        inputs=tuple(model.inputs[k] for k in keep),
-        B=model.B[:, keep],
-        D=model.D[:, keep],
-        terms=terms,
-        parameters=tuple(p for p in model.parameters if p.name in left),
-    )
-
-
-def _names(value: tuple[str, ...] | str) -> tuple[str, ...]:
-    return (value,) if isinstance(value, str) else tuple(value)
+def has_equations(model: LinearModel) -> TypeGuard[NonlinearModel]:
+    """Return whether a model is made of a user's equations; the code for them is not imported."""
+    return model.of_equations

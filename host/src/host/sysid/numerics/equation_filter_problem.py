@@ -15,14 +15,10 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array
-from host.compiled import has_compiler
 from host.errors import IdentificationError
-from host.extras import install_hint
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
-from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.equation_filter import EquationModel, filter_equations
-from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.innovation_problem import (
     Filtered,
     InnovationLikelihood,
@@ -38,26 +34,6 @@ STEP_BOUNDS = 1e-4  # of a bound: differences
 LOG_STEP = 1e-5  # of a logarithm of a deviation
 # A filter corrects what a step misses: at most two from sample to sample, one of a quick record.
 MOST_FILTER_STEPS, QUICK_S = 2, 0.0125
-SAMPLES_WITHOUT_COMPILER = 500  # of a filter that Python runs in minutes
-
-
-def innovation_problem(
-    model: LinearModel, maneuvers: Sequence[Maneuver], process: tuple[str, ...]
-) -> InnovationProblem:
-    """Return the problem of filter error of a linear model, or of a user's equations."""
-    if isinstance(model, NonlinearModel):
-        return EquationFilterProblem(model, maneuvers, process)
-    return FilterProblem(model, maneuvers, process)
-
-
-def needs_compiler(model: LinearModel, maneuvers: Sequence[Maneuver]) -> str:
-    """Return why a filter takes hours over these maneuvers; empty where it does not."""
-    own = isinstance(model, NonlinearModel)
-    samples = sum(m.samples for m in maneuvers if own or m.held)
-    if has_compiler() or samples <= SAMPLES_WITHOUT_COMPILER:
-        return ""
-    what = "of equations" if own else "of columns with missing rows"
-    return f"a filter {what} takes hours without numba: {install_hint('numba')}"
 
 
 class EquationFilterProblem(InnovationProblem):

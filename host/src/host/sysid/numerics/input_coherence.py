@@ -35,7 +35,8 @@ from host.sysid.numerics.information_inverse import (
 )
 from host.sysid.numerics.input_regressors import input_regressors, lag_knots_s
 from host.sysid.numerics.model_error_signatures import model_error_signatures
-from host.sysid.numerics.output_error_problem import OutputProblem, Response
+from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics.response import Response
 from host.sysid.numerics.signature_test import SignatureTest, WhitenedOutput, signature_test
 
 SIGNIFICANCE = 0.01  # from here on the model is said to lack something

@@ -12,12 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import special
 
-from host.arrays import Array
-from host.sysid.models.uncertainty import Uncertainty
+if TYPE_CHECKING:
+    from host.arrays import Array
+    from host.sysid.models.uncertainty import Uncertainty
 
 SIGNIFICANCE = 0.01
 MIN_EFFECTIVE_MANEUVERS = 1.5  # effective number that inform a parameter, for a test

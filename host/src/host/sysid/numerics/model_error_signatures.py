@@ -13,7 +13,8 @@ import numpy as np
 from scipy import linalg
 
 from host.arrays import Array
-from host.sysid.numerics.output_error_problem import OutputProblem, Response
+from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics.response import Response
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,13 +37,6 @@ class Given:
     bias: Array
 
 
-def output_problem(model: LinearModel, maneuvers: Sequence[Maneuver]) -> OutputProblem:
-    """Return the problem of output error of a linear model, or of a user's equations."""
-    if isinstance(model, NonlinearModel):
-        return NonlinearProblem(model, maneuvers)
-    return OutputProblem(model, maneuvers)
-
-
 class NonlinearProblem(OutputProblem):
     """The same for equations.
 

@@ -17,7 +17,8 @@ from host.sysid.numerics.gauss_newton import (
     free_of_bounds,
     gauss_newton,
 )
-from host.sysid.numerics.output_error_problem import OutputProblem, Response
+from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics.response import Response
 
 MAX_ITERATIONS = 60
 MOST_NAMED = 5

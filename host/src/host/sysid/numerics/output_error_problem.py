@@ -13,27 +13,12 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.fractional_delay import delay_columns, slope_by_delay
 from host.sysid.numerics.recursion import propagate, simulate
+from host.sysid.numerics.response import Response
 from host.sysid.numerics.sampled_model import SampledModel, Sampler
 
 # Of an output's motion: no column is better than this, nor the model of it. Without noise in one
 # column its information drowned that of all others, and 73 to 93 % of the intervals held.
 CLEAN_SHARE = 1e-3
-
-
-@dataclass(frozen=True, slots=True)
-class Response:
-    """Simulated outputs of one maneuver and their sensitivities.
-
-    Attributes
-    ----------
-    y : Array, shape (p, samples)
-        Outputs in the units of the model.
-    sensitivities : Array, shape (p, samples, columns of this maneuver)
-        Derivatives of `y` by the unknowns that this maneuver depends on.
-    """
-
-    y: Array
-    sensitivities: Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from host.arrays import Array
+
+if TYPE_CHECKING:
+    from host.sysid.models.maneuver import Maneuver
 
 MEDIAN_TO_SIGMA = 1.4826  # of a normal distribution
 THIRD_DIFFERENCE_POWER = 20.0  # over that of white noise
@@ -21,3 +25,12 @@ def white_deviation(records: Sequence[Array]) -> Array:
     """
     third = np.abs(np.concatenate([np.diff(columns, n=3, axis=0) for columns in records]))
     return np.asarray(MEDIAN_TO_SIGMA * np.median(third, axis=0) / np.sqrt(THIRD_DIFFERENCE_POWER))
+
+
+def noise_deviation(maneuvers: Sequence[Maneuver]) -> Array:
+    """Return the deviation of white output noise from third differences (20 times its power)."""
+    stacked = np.vstack([np.diff(m.outputs, n=3, axis=0) for m in maneuvers])
+    floor = 1e-6 * np.max(np.abs(np.vstack([m.outputs for m in maneuvers])), axis=0) + 1e-12
+    return np.asarray(
+        np.maximum(np.sqrt(np.mean(stacked**2, axis=0) / THIRD_DIFFERENCE_POWER), floor)
+    )

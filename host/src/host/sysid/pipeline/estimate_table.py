@@ -6,16 +6,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from host.sysid.answer.converted_marks import converted_marks
-from host.sysid.answer.marks import Verdict
 from host.sysid.answer.mat_file import labels
-from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
-from host.sysid.linear.linear_answer import Answer
 from host.sysid.models.diagnostics import reference_values
-from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.parameter_units import parameter_unit
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from host.sysid.answer.marks import Verdict
+    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+    from host.sysid.linear.linear_answer import Answer
+    from host.sysid.models.modal_analysis import Mode
 
 COLUMNS = ("value", "half_width", "unit", "relative_half_width", "verdict", "widened_by")
 MODE_COLUMNS = (

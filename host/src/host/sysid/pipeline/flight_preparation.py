@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from host.instrument.deviations import SensorErrorModel, unknown_sensors
 from host.instrument.error_labels import recording_notes
 from host.instrument.servo_prior import servo_prior
 from host.physical.calibration import load_calibration
-from host.sysid.aerodynamics.thrust_terms import with_thrust
+from host.sysid.aerodynamics.measured_thrust import with_thrust
 from host.sysid.checks.agreement_findings import calibration_findings, disagreement
 from host.sysid.checks.airspeed_scale import airspeed_scale_findings
 from host.sysid.checks.data_finding import Finding
@@ -27,7 +28,6 @@ from host.sysid.maneuvers.maneuver_selection import overlap_notes, select_maneuv
 from host.sysid.pipeline.flight_at_hand import FlightAtHand
 from host.sysid.pipeline.known_aircraft import AircraftData
 from host.sysid.pipeline.surface_travel import with_surface_angles
-from host.sysid.reconstruction.flow_angles import FlowAngles, reconstruct_flow_angles
 from host.sysid.reconstruction.ground_attitude import update_by_standstill
 from host.sysid.reconstruction.reconstruction import (
     Compatibility,
@@ -37,6 +37,9 @@ from host.sysid.reconstruction.reconstruction import (
 )
 from host.sysid.reconstruction.sensor_corrections import without_estimated_delays
 from host.sysid.reconstruction.servo_response import commands_of, surface_positions
+
+if TYPE_CHECKING:
+    from host.sysid.reconstruction.flow_angles import FlowAngles
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +180,8 @@ def _hidden_angles(
     """Return the flow angles that no vane measured, where they can be told, and a line of them."""
     if agreement is None or agreement.vanes or known is None:
         return None, ()
+    from host.sysid.reconstruction.flow_angles import reconstruct_flow_angles
+
     try:
         angles = reconstruct_flow_angles(corrected, agreement, known.airframe)
     except IdentificationError as error:

@@ -1,4 +1,7 @@
-"""The answer of `host.identify`: estimates, the data they rest on, and all forms of output."""
+"""The answer of `host.identify`: estimates, the data they rest on, and all forms of output.
+
+A form that is asked for is imported then: pictures, files, pages, comparison with truth or prior.
+"""
 
 from __future__ import annotations
 
@@ -8,41 +11,31 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from host.aircraft.prior.prior_table import PriorTable
-from host.sysid.aerodynamics.coefficient_table import CoefficientTable
-from host.sysid.answer.answer_figures import draw_all
-from host.sysid.answer.estimate_lines import coefficient_lines, model_lines
-from host.sysid.answer.json_document import answer_document, coefficient_document, json_text
-from host.sysid.answer.marks import Verdict
 from host.sysid.answer.method_comparison import method_table
-from host.sysid.answer.output_files import OutputPaths, check_outputs, write_outputs
-from host.sysid.answer.prior_comparison import prior_document, prior_lines
 from host.sysid.answer.short_answer import MOST_LINES, REST, mode_summary, short_table
-from host.sysid.answer.truth_comparison import truth_document, truth_report_lines
 from host.sysid.answer.verdict import judge, removed_error_lines
-from host.sysid.checks.data_finding import Finding, finding_document
-from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
-from host.sysid.flight.reconstructed_flight import ReconstructedFlight
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.checks.data_finding import Finding
 from host.sysid.pipeline.arguments import chosen_stretches, numbers_of, path_of
 from host.sysid.pipeline.estimate_table import estimate_table, mode_table
 from host.sysid.pipeline.flight_at_hand import listed_flights, read_flight
 from host.sysid.pipeline.flight_preparation import prepare
-from host.sysid.pipeline.known_aircraft import AircraftData
-from host.sysid.pipeline.notebook_html import answer_html
-from host.sysid.pipeline.notebook_pictures import Pictures
-from host.sysid.pipeline.reading_options import ReadingOptions
-from host.sysid.pipeline.simulation import Simulation, identified_models, simulate
-from host.sysid.reconstruction.reconstruction import (
-    Compatibility,
-    compatibility_document,
-    compatibility_lines,
-)
+from host.sysid.reconstruction.reconstruction import Compatibility
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from host.aircraft.prior.prior_table import PriorTable
+    from host.sysid.aerodynamics.coefficient_table import CoefficientTable
+    from host.sysid.answer.marks import Verdict
+    from host.sysid.answer.output_files import OutputPaths
+    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+    from host.sysid.flight.reconstructed_flight import ReconstructedFlight
+    from host.sysid.linear.linear_answer import Answer
     from host.sysid.pipeline.flight_at_hand import Source
+    from host.sysid.pipeline.known_aircraft import AircraftData
+    from host.sysid.pipeline.notebook_pictures import Pictures
+    from host.sysid.pipeline.reading_options import ReadingOptions
+    from host.sysid.pipeline.simulation import Simulation
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +120,9 @@ class Identification:
         IdentificationError
             If matplotlib is missing.
         """
+        from host.sysid.answer.answer_figures import draw_all
+        from host.sysid.pipeline.notebook_pictures import Pictures
+
         recorded = [flight.recorded for flight in self.flights]
         made = self.linear, self.coefficients, self.verdicts
         return Pictures(draw_all(*made, recorded, self.truth))
@@ -161,6 +157,8 @@ class Identification:
         host.errors.HostError
             If it cannot be read, or no model can be run over it.
         """
+        from host.sysid.pipeline.simulation import identified_models, simulate
+
         how = replace(
             self.reading,
             calibration=path_of("calibration", calibration) or self.reading.calibration,
@@ -176,28 +174,14 @@ class Identification:
 
     def document(self) -> dict[str, Any]:
         """Return everything as plain lists, numbers and strings; several flights are lists."""
-        direct = self.coefficients
-        documents = [
-            answer_document(answer, (*verdict.lines, *removed_error_lines([answer])), verdict)
-            for answer, verdict in zip(self.linear, self.verdicts, strict=False)
-        ]
-        if direct:
-            documents.append(coefficient_document(direct, self.verdicts[-1]))
-        sources = [flight.source for flight in self.flights]
-        agreements = [compatibility_document(a) if a else None for a in self.agreements]
-        one = len(sources) == 1
-        return {
-            "source": sources[0] if one else sources,
-            "findings": [finding_document(finding) for finding in self.findings],
-            "notes": list(self.notes),
-            "data_compatibility": agreements[0] if one else agreements,
-            "answers": documents,
-            "truth": truth_document(self.linear, direct, self.truth) if self.truth else None,
-            "prior": prior_document(self.coefficient_tables, self.prior) if self.prior else None,
-        }
+        from host.sysid.pipeline.whole_answer import whole_document
+
+        return whole_document(self)
 
     def to_json(self) -> str:
         """Return the answer as JSON text; what is no finite number is null."""
+        from host.sysid.answer.json_document import json_text
+
         return json_text(self.document())
 
     def to_text(self, width: int = 100, *, full: bool = True) -> str:
@@ -212,14 +196,11 @@ class Identification:
             comparison with a truth or a prior that was given.
         """
         lines = [*self.judgement, *(removed_error_lines(self.linear) if full else ())]
-        if not full:
-            lines += ["", *self._short(width)]
-        else:
-            lines += self._numbers(width)
-        if self.prior is not None:
-            lines += ["", *prior_lines(self.coefficient_tables, self.prior)]
-        if self.truth is not None:
-            lines += ["", *truth_report_lines(self.linear, self.coefficients, self.truth)]
+        lines += self._numbers(width) if full else ["", *self._short(width)]
+        if self.prior is not None or self.truth is not None:
+            from host.sysid.pipeline.whole_answer import compared_lines
+
+            lines += compared_lines(self)
         return "\n".join(lines)
 
     def _short(self, width: int) -> list[str]:
@@ -233,19 +214,9 @@ class Identification:
         return [*modes, "", *table, REST]
 
     def _numbers(self, width: int) -> list[str]:
-        lines: list[str] = []
-        if len(self.methods) > 1:
-            lines += ["", *method_table(self.linear, width)]
-        else:
-            for answer in self.linear:
-                lines += ["", *model_lines(answer)]
-        if self.coefficients:
-            lines += ["", *coefficient_lines(self.coefficients)]
-        for flight, agreement in zip(self.flights, self.agreements, strict=True):
-            if agreement:
-                named = [flight.source] if len(self.flights) > 1 else []
-                lines += ["", *named, *compatibility_lines(agreement)]
-        return lines
+        from host.sysid.pipeline.whole_answer import number_lines
+
+        return number_lines(self, width)
 
     def save(self, places: OutputPaths) -> list[Path]:
         """Write every requested file and return them.
@@ -255,6 +226,8 @@ class Identification:
         UsageError
             If a place cannot be written to, or holds what the answer is made from.
         """
+        from host.sysid.answer.output_files import check_outputs, write_outputs
+
         check_outputs(places)
         recorded = [flight.recorded for flight in self.flights]
         return write_outputs(
@@ -271,6 +244,8 @@ class Identification:
         return f"<Identification of {', '.join(f.source for f in self.flights)}: {named}>"
 
     def _repr_html_(self) -> str:
+        from host.sysid.pipeline.notebook_html import answer_html
+
         sources = ", ".join(flight.source for flight in self.flights)
         tables = {"estimates, 95 % half-widths": self.table, "modes": self.modes}
         return answer_html(f"identified from {sources}", self.verdict, tables)

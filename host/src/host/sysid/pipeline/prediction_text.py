@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from host.sysid.models.nonlinear_model import NonlinearModel
+from host.sysid.models.state_space_model import has_equations
 from host.sysid.pipeline.simulation import SimulatedModel, Simulation
 
 
@@ -28,7 +28,7 @@ def _held(m: SimulatedModel, *, constants: bool) -> str:
     """Return what else of a model was fitted, or what stands in its place."""
     if constants:
         return "biases and start states fitted to each maneuver"
-    if isinstance(m.model, NonlinearModel):
+    if has_equations(m.model):
         return (
             "nothing fitted: from the mean of the 0.3 s before each input, parameters of each"
             " record at their start values"

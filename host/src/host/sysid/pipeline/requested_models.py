@@ -5,20 +5,25 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from host.errors import IdentificationError
 from host.near_names import like
+from host.sysid import coefficients, models
 from host.sysid.estimators.method_registry import all_methods, find_method
 from host.sysid.estimators.method_registry import methods as single_methods
-from host.sysid.linear.linear_model import AXIS_OF, DEFAULT_METHOD, STAGED
-from host.sysid.models.coefficient_model import KIND, CoefficientModel
-from host.sysid.models.model_file import read_model, standard_model
+from host.sysid.linear.model_names import AXIS_OF, DEFAULT_METHOD, STAGED
 from host.sysid.models.named_models import model_path, shipped_files, shipped_lines
-from host.sysid.models.state_space_model import CONSTANT, LinearModel
 from host.sysid.models.thrust_column import THRUST_COLUMNS
 from host.sysid.pipeline.arguments import listed
 
-COEFFICIENTS = KIND  # the name of the standard ones
+if TYPE_CHECKING:
+    from host.sysid.coefficients import CoefficientModel
+    from host.sysid.models import LinearModel
+
+    ModelName = str | Path | LinearModel | CoefficientModel
+
+COEFFICIENTS = "coefficients"  # the name of the standard ones
 DEFAULT_MODELS = ("longitudinal", "lateral")
 # What stands in the place of a default model, and why.
 WITHOUT_AIRSPEED = (
@@ -39,7 +44,6 @@ WITHOUT_BANK = (
     {"lateral": "dutch-roll"},
     "without phi_rad lateral cannot be told: dutch-roll in its place",
 )
-ModelName = str | Path | LinearModel | CoefficientModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +66,8 @@ class Models:
     @property
     def signals(self) -> tuple[str, ...]:
         """Inputs and outputs of the user's own models; thrust where it was measured."""
-        own = {s for _, m in self.linear if m is not None for s in (*m.inputs, *m.outputs)}
-        return tuple(sorted((own | set(THRUST_COLUMNS)) - {CONSTANT}))
+        own = {s for _, m in self.linear if m is not None for s in m.signals()}
+        return tuple(sorted({*own, *THRUST_COLUMNS}))
 
 
 def requested_models(given: ModelName | Iterable[ModelName] | None) -> Models:
@@ -79,29 +83,22 @@ def requested_models(given: ModelName | Iterable[ModelName] | None) -> Models:
     IdentificationError
         If there is no such model, or there are two sets of coefficients.
     """
-    names = listed(given) or list(DEFAULT_MODELS)
     linear: list[tuple[str, LinearModel | None]] = []
     terms: list[CoefficientModel] = []
-    for name in names:
-        if isinstance(name, LinearModel):
-            linear.append((name.name, name))
-        elif isinstance(name, CoefficientModel):
-            terms.append(name)
-        elif name == COEFFICIENTS:
-            terms.append(standard_model())
-        elif not isinstance(name, str | Path):
+    for name in listed(given) or DEFAULT_MODELS:
+        model = _named_model(name) if isinstance(name, str | Path) else name
+        if model is None:
+            linear.append((str(name), None))
+        elif isinstance(model, coefficients.CoefficientModel):
+            terms.append(model)
+        elif isinstance(model, models.LinearModel):
+            linear.append((str(name) if isinstance(name, str | Path) else model.name, model))
+        else:
             raise IdentificationError(
                 f"a model is of type {type(name).__name__}, expected a name, a path, a LinearModel"
                 " or a CoefficientModel"
             )
-        else:
-            read = _named_model(name)
-            if isinstance(read, CoefficientModel):
-                terms.append(read)
-            else:
-                linear.append((str(name), read))
-    standard = standard_model() if COEFFICIENTS in names else None
-    if len([t for t in terms if t is not standard]) + (standard is not None) > 1:
+    if len({*map(id, terms)}) > 1:
         raise IdentificationError(
             "argument models names several models of the coefficients; give one at a time"
         )
@@ -113,10 +110,12 @@ def _named_model(name: str | Path) -> LinearModel | CoefficientModel | None:
     called = str(name)
     if name in AXIS_OF:
         return None
+    if name == COEFFICIENTS:
+        return coefficients.standard_model()
     if (called and Path(name).exists()) or called.lower().endswith(".toml"):
-        return read_model(Path(name), of_coefficients=True)
+        return models.read_model(Path(name), of_coefficients=True)
     if called in shipped_files():
-        return read_model(model_path(name))
+        return models.read_model(model_path(name))
     raise IdentificationError(
         f"no model '{name}'{like(called, (*AXIS_OF, COEFFICIENTS, *shipped_files()))};"
         f" there are {', '.join(AXIS_OF)}, coefficients, those of the thesis (`--model"
@@ -137,8 +136,8 @@ def possible_models(asked: Models, columns: Sequence[Collection[str]]) -> tuple[
         return asked, []
     instead: dict[str, str] = {}
     notes: list[str] = []
-    for models, note in _wanting(columns):
-        instead = models | instead
+    for other, note in _wanting(columns):
+        instead = other | instead
         notes.append(note)
     linear = tuple((instead.get(name, name), own) for name, own in asked.linear)
     return replace(asked, linear=linear), notes

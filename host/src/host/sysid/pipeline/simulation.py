@@ -8,16 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.answer.figure_kinds import Trace, histories
 from host.sysid.answer.mat_file import labels
-from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
-from host.sysid.flight.reconstructed_flight import ReconstructedFlight, flown_maneuvers
-from host.sysid.linear.linear_answer import Answer
+from host.sysid.flight.flown_maneuver import flown_maneuvers
+from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.maneuvers.maneuver_selection import excited_axes, merge_overlapping
-from host.sysid.models.diagnostics import SignalFit
-from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
 from host.sysid.models.theil_inequality import TheilInequality, theil_inequality
 from host.sysid.pipeline.notebook_html import answer_html
@@ -27,6 +23,12 @@ from host.sysid.validation.window_prediction import WINDOWS_S, WindowErrors, win
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from host.arrays import Array
+    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+    from host.sysid.linear.linear_answer import Answer
+    from host.sysid.models.diagnostics import SignalFit
+    from host.sysid.models.maneuver import Maneuver
 
 FIGURES = ("nrmse", "r_squared", "theil")
 KINEMATIC = ("theta_rad", "phi_rad")  # their rates are known

@@ -1,4 +1,7 @@
-"""`host.identify`: the stages of identification, in their order."""
+"""`host.identify`: the stages of identification, in their order.
+
+Estimators come by the face of their room, which imports what is asked for.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 from host.aircraft.powerplant import without_propeller
 from host.aircraft.prior.prior_file import read_prior
-from host.aircraft.prior.prior_table import PriorTable
 from host.errors import IdentificationError
 from host.progress import stage
-from host.sysid.answer.truth_comparison import read_truth
+from host.sysid import answer, coefficients, linear
 from host.sysid.checks.data_finding import accepted_in_vain
-from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, CoefficientEstimator
 from host.sysid.estimators.method_options import check_options, options_of
 from host.sysid.flight.estimator import answer_of
-from host.sysid.flight.reconstructed_flight import ReconstructedFlight
-from host.sysid.linear.linear_answer import Answer
-from host.sysid.linear.linear_estimator import LinearEstimator
 from host.sysid.pipeline.arguments import (
     path_of,
     paths_of,
@@ -34,7 +32,6 @@ from host.sysid.pipeline.identification import Identification
 from host.sysid.pipeline.known_aircraft import AircraftData, aircraft_data
 from host.sysid.pipeline.reading_options import OfEach, joined_stretches, reading_options
 from host.sysid.pipeline.requested_models import (
-    ModelName,
     Models,
     possible_models,
     requested_methods,
@@ -42,7 +39,12 @@ from host.sysid.pipeline.requested_models import (
 )
 
 if TYPE_CHECKING:
+    from host.aircraft.prior.prior_table import PriorTable
+    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+    from host.sysid.flight.reconstructed_flight import ReconstructedFlight
+    from host.sysid.linear.linear_answer import Answer
     from host.sysid.pipeline.flight_at_hand import Source
+    from host.sysid.pipeline.requested_models import ModelName
 
 
 def identify(
@@ -197,14 +199,14 @@ def identify_columns(
     asked, instead = possible_models(asked, [flight.recorded for flight in recorded])
     more += instead
     direct, doubts = _coefficients(asked, known, recorded)
-    linear, unfit = _linear(asked, by, options, known, recorded)
-    if not linear and direct is None:
+    fitted, unfit = _linear(asked, by, options, known, recorded)
+    if not fitted and direct is None:
         notes = [*collected_notes(ready, reading, unchecked=False), *more]
         raise IdentificationError("; ".join([*unfit, *doubts, *(f.line for f in findings), *notes]))
     return Identification(
         flights=tuple(recorded),
         agreements=tuple(one.agreement for one in ready),
-        linear=tuple(linear),
+        linear=tuple(fitted),
         coefficients=direct,
         notes=(*collected_notes(ready, reading), *more, *doubts, *unfit),
         methods=by,
@@ -228,7 +230,7 @@ def _coefficients(
         )
     stage("coefficients")
     try:
-        by = CoefficientEstimator(
+        by = coefficients.CoefficientEstimator(
             known.airframe,
             known.powerplant or without_propeller(),
             known.instrument,
@@ -252,7 +254,7 @@ def _linear(
     for method in by:
         for name, own in asked.linear:
             stage(f"{name} by {method}")
-            estimator = LinearEstimator(
+            estimator = linear.LinearEstimator(
                 name,
                 own,
                 method,
@@ -281,7 +283,7 @@ def _truth(paths: Sequence[Path], flights: int) -> dict[str, Any] | None:
     """Return the truth of all flights as one, with the maneuvers of all."""
     if not paths:
         return None
-    documents = [read_truth(path) for path in paths]
+    documents = [answer.read_truth(path) for path in paths]
     if len(documents) != flights:
         raise IdentificationError(
             f"{len(documents)} files of truth for {flights} flights; give one of each flight"

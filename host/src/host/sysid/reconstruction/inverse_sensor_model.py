@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel
 from host.physical.recording import SURFACES
+from host.sysid.reconstruction.path_preparation import SLIDING_RADPS
 
 PASS_HZ, STOP_HZ = 9.0, 13.0
 FIT_RATE_HZ = 33.0  # signals end at 13 Hz; a fit takes a third of the time
-# Above this rate a vane slides; noise of its rate after the low-pass is about 0.015 rad/s.
-SLIDING_RADPS = 0.02
 ATTITUDE_CROSSOVER_RADPS = 2.0 * np.pi * 0.05  # attitude filter below, integrated gyro above
 Spectrum = NDArray[np.complex128]
 

@@ -36,10 +36,11 @@ from host.sysid.reconstruction.flight_path import (
     Segment,
 )
 from host.sysid.reconstruction.gps_fixes import gps_fixes
-from host.sysid.reconstruction.inverse_sensor_model import SLIDING_RADPS
 from host.sysid.reconstruction.position_correction import transfer_to_cg
 from host.sysid.reconstruction.strapdown import rotation
 
+# Above this rate a vane slides; noise of its rate after the low-pass is about 0.015 rad/s.
+SLIDING_RADPS = 0.02
 BLOCK_S = 0.05  # samples are averaged over this: the motion of a trainer is far below 10 Hz
 SEGMENT_S = 12.0
 SHORT_SEGMENT_S = 6.0  # without GPS nothing holds the path for longer

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,17 +14,27 @@ from host.sysid.maneuvers.maneuver_detection import LEAD_S
 from host.sysid.models.diagnostics import SignalFit, signal_fits
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.nonlinear_model import NonlinearModel
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.state_space_model import LinearModel, has_equations
 from host.sysid.numerics.information_inverse import covariance_from_information
-from host.sysid.numerics.nonlinear_problem import NonlinearProblem, output_problem
-from host.sysid.numerics.output_error_problem import OutputProblem, Response
-from host.sysid.validation.window_prediction import Biases
+from host.sysid.numerics.model_problems import output_problem
+from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics.response import Response
 
 CONSTANT_ROUNDS = 6  # steps to the constants of each record, where outputs bend in them
 # With the weights of the first guess alone az was told by offsets of 20 m/s2, and its residual was
 # coherent with the inputs in calm air (5 times the noise).
 WEIGHINGS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Biases:
+    """Biases of the state equations, (n,), and of the outputs, (p,), in one maneuver; of equations
+    also the parameters that each record has of its own.
+    """
+
+    rate: Array
+    output: Array
+    own: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +106,7 @@ def estimate_with_constants(problem: OutputProblem, estimate: Array) -> Array | 
     """
     theta, count = problem.first_guess(), problem.n_common
     theta[:count] = estimate[:count]
-    for _ in range(CONSTANT_ROUNDS if isinstance(problem, NonlinearProblem) else 1):
+    for _ in range(CONSTANT_ROUNDS if has_equations(problem.model) else 1):
         responses = problem.respond(theta)
         if responses is None:
             return None
@@ -164,7 +174,7 @@ def frozen_model(model: LinearModel, result: FitResult) -> LinearModel:
 
 def frozen_at(model: LinearModel, theta: Array) -> LinearModel:
     """Return the model frozen at values of its parameters, biases and start states left free."""
-    if isinstance(model, NonlinearModel):
+    if has_equations(model):
         return model.frozen_at(theta)
     A, B, C, D = model.matrices(theta)
     value = dict(zip((p.name for p in model.parameters), theta.tolist(), strict=True))
@@ -202,7 +212,7 @@ def _trimmed_run(frozen: LinearModel, maneuver: Maneuver) -> FreeRun:
     """
     lead = slice(0, max(1, round(LEAD_S / maneuver.dt_s)))
     y, u = maneuver.outputs[lead].mean(axis=0), maneuver.inputs[lead].mean(axis=0)
-    if isinstance(frozen, NonlinearModel):
+    if has_equations(frozen):
         controls, outputs = (np.tile(mean, (maneuver.samples, 1)) for mean in (u, y))
         at_rest = Maneuver(maneuver.dt_s, controls, outputs, name=maneuver.name)
         return _run_of(frozen, maneuver, output_problem(frozen, [at_rest]).first_guess())
@@ -250,7 +260,7 @@ def _biases(frozen: LinearModel, theta: Array) -> Biases:
         rate[frozen.states.index(state)] = value
     for name, value in zip(frozen.output_biases, theta[count:], strict=False):
         output[frozen.outputs.index(name)] = value
-    if isinstance(frozen, NonlinearModel):
+    if has_equations(frozen):
         return Biases(rate, output, theta[len(theta) - len(frozen.own_parameters) :])
     return Biases(rate, output)
 

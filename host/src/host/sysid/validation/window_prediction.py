@@ -9,17 +9,18 @@ than that predicts nothing.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from host.arrays import Array, IntArray
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.state_space_model import LinearModel, has_equations
 from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.equation_recursion import simulate_equations
 from host.sysid.numerics.nonlinear_problem import NonlinearProblem, finite
+from host.sysid.validation.free_simulation import Biases
 
 WINDOWS_S = (0.1, 0.5, 1.0, 2.0)
 PARTS = 4  # a window begins every quarter of its length
@@ -48,17 +49,6 @@ class WindowErrors:
         """Error of the model over that of persistence, (p,); NaN where persistence has none."""
         safe = np.where(self.persistence > 0.0, self.persistence, np.nan)
         return np.asarray(self.model / safe, dtype=np.float64)
-
-
-@dataclass(frozen=True, slots=True)
-class Biases:
-    """Biases of the state equations, (n,), and of the outputs, (p,), in one maneuver; of equations
-    also the parameters that each record has of its own.
-    """
-
-    rate: Array
-    output: Array
-    own: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def window_errors(
@@ -114,7 +104,7 @@ def _restarted(
     steps: int,
 ) -> Array:
     """Return the outputs after each step from measured states, (starts, steps, p)."""
-    if isinstance(model, NonlinearModel):
+    if has_equations(model):
         return _restarted_equations(model, maneuver, bias, free, starts, steps)
     n, m = len(model.states), len(model.inputs)
     foh = model.hold == "foh"

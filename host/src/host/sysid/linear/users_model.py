@@ -9,7 +9,7 @@ done or refused, never replaced.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,14 +19,14 @@ from host.sysid.estimators.filter_error import near_its_optimum
 from host.sysid.estimators.filter_error_gust import SLOW_IN_CALM, fit_with_gust
 from host.sysid.estimators.gust_delays import advance_outputs
 from host.sysid.estimators.gust_model import VANES
-from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators.method_fit import fit
 from host.sysid.estimators.noise_model_comparison import bayes_criterion
 from host.sysid.estimators.output_error_fit import sample_periods
+from host.sysid.linear.linear_stages import LinearFit
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.nonlinear_model import NonlinearModel
-from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.equation_filter_problem import needs_compiler
+from host.sysid.models.state_space_model import LinearModel, has_equations
+from host.sysid.numerics.model_problems import needs_compiler
 
 GUST, FILTER = "filter-error-gust", "filter-error"
 MEMORY, WHITE = "output-error", "output-error-white"
@@ -37,37 +37,13 @@ AT_LIMIT = 1e-9
 MOST_WORK = 1_200_000
 
 
-@dataclass(frozen=True)
-class UsersFit:
-    """How a user's model was fitted.
-
-    Attributes
-    ----------
-    method : str
-    result : FitResult
-        Its model is the one that was fitted, parameters of gusts with it.
-    maneuvers : tuple of Maneuver
-        As fitted: a filter gets its outputs without delays.
-    delays : dict
-        What was taken out: value and 95 % half-width, s.
-    remarks : tuple of str
-        Why this method.
-    """
-
-    method: str
-    result: FitResult
-    maneuvers: tuple[Maneuver, ...]
-    delays: dict[str, tuple[float, float]] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()
-
-
 def fit_users_model(
     method: str,
     model: LinearModel,
     maneuvers: Sequence[Maneuver],
     airspeed_mps: float | None,
     options: Mapping[str, object],
-) -> UsersFit:
+) -> LinearFit:
     """Fit by a method that was asked for.
 
     Parameters
@@ -90,12 +66,12 @@ def fit_users_model(
     if method == FILTER:
         return _filter_fit(model, maneuvers, options)
     single = {"multiple_starts": False} if method.startswith(MEMORY) else {}
-    return UsersFit(method, fit(method, model, maneuvers, **{**single, **options}), (*maneuvers,))
+    return _found(method, fit(method, model, maneuvers, **{**single, **options}), (*maneuvers,))
 
 
 def fit_by_evidence(
     model: LinearModel, maneuvers: Sequence[Maneuver], airspeed_mps: float | None
-) -> UsersFit:
+) -> LinearFit:
     """Fit by output error, white or with a memory, or by filter error: whichever explains the data.
 
     The Bayesian information criterion is -2 ln L + k ln N with k unknowns and N samples (Schwarz,
@@ -121,11 +97,11 @@ def fit_by_evidence(
     if memory and seen and not coloured:
         named = replace(plain.result, method="output error (white)")
         line = f"{NOISE_CHOSEN}: white, it has no memory"
-        return UsersFit(WHITE, named, plain.maneuvers, remarks=(line,))
+        return _found(WHITE, named, plain.maneuvers, remarks=(line,))
     why = no_filter(model, maneuvers)
     late = sum(bool({*d.outputs} & {*model.outputs}) for d in model.delays)  # inputs cost nothing
     work = sum(m.samples for m in maneuvers) * len(plain.result.estimate) * (1 + late)
-    if not why and isinstance(model, NonlinearModel) and work > MOST_WORK:
+    if not why and has_equations(model) and work > MOST_WORK:
         why = f"that would take many minutes; --method {FILTER} does it"
     if why:
         return replace(plain, remarks=(f"{NOISE_CHOSEN}: {own}; no gust tried: {why}",))
@@ -150,7 +126,7 @@ def no_filter(model: LinearModel, maneuvers: Sequence[Maneuver]) -> str:
         return why
     if model.known_noise:
         return "a filter estimates the noise, and this one is known"
-    if isinstance(model, NonlinearModel) and not model.process_noise:
+    if has_equations(model) and not model.process_noise:
         return "process_noise of the model is empty"
     return ""
 
@@ -162,7 +138,7 @@ def no_gust_state(model: LinearModel, airspeed_mps: float | None) -> str:
     which the angle of the path counts, or a known derivative, in which that of the air does.
     """
     vane = next((v for v in VANES if v in model.states and v in model.outputs), None)
-    if isinstance(model, NonlinearModel):
+    if has_equations(model):
         return "it has equations"
     if vane is None:
         return "neither alpha_rad nor beta_rad is a measured state of it"
@@ -176,9 +152,22 @@ def no_gust_state(model: LinearModel, airspeed_mps: float | None) -> str:
     return ""
 
 
+def _found(
+    method: str,
+    result: FitResult,
+    maneuvers: tuple[Maneuver, ...],
+    delays: Mapping[str, tuple[float, float]] | None = None,
+    remarks: tuple[str, ...] = (),
+) -> LinearFit:
+    """Return a fit whose maneuvers are as it got them: a filter's without delays."""
+    return LinearFit(
+        result, result.model, method, maneuvers, result.fitted, dict(delays or {}), remarks=remarks
+    )
+
+
 def _gust_fit(
     model: LinearModel, maneuvers: Sequence[Maneuver], airspeed_mps: float | None
-) -> UsersFit:
+) -> LinearFit:
     why = no_gust_state(model, airspeed_mps) or no_filter(model, maneuvers)
     if why or airspeed_mps is None:
         raise IdentificationError(
@@ -192,19 +181,19 @@ def _gust_fit(
         calm = SLOW_IN_CALM in found.result.warnings
         why = "finds calm air and slow columns in" if calm else "does not converge on"
         raise IdentificationError(f"{GUST} {why} {model.name}; {FILTER} and {MEMORY} are there")
-    return UsersFit(GUST, found.result, found.maneuvers, found.delays)
+    return _found(GUST, found.result, found.maneuvers, found.delays)
 
 
 def _filter_fit(
     model: LinearModel, maneuvers: Sequence[Maneuver], options: Mapping[str, object]
-) -> UsersFit:
+) -> LinearFit:
     """Fit by filter error, delays of output error taken out before it."""
     why = no_filter(model, maneuvers)
     if why:
         raise IdentificationError(f"{FILTER} cannot fit {model.name}: {why}; {MEMORY} is there")
-    if not model.delays or isinstance(model, NonlinearModel):  # whose filter has delays
+    if not model.delays or has_equations(model):  # whose filter has delays
         found = fit(FILTER, model, maneuvers, compare_noise=False, **options)
-        return _converged(UsersFit(FILTER, found, (*maneuvers,)))
+        return _converged(_found(FILTER, found, (*maneuvers,)))
     one_rate = len(sample_periods(maneuvers)) == 1
     late = fit(MEMORY if one_rate else WHITE, model, maneuvers, multiple_starts=False)
     half = late.half_width()
@@ -217,7 +206,7 @@ def _filter_fit(
     covariance = found.covariance.copy()
     covariance[:count, :count] += _of_delays(late, list(values), count)
     found = replace(found, covariance=covariance)
-    done = _converged(UsersFit(FILTER, found, advanced, delays))
+    done = _converged(_found(FILTER, found, advanced, delays))
     ends = [d.name for d in model.delays if abs(values[d.name]) >= d.limit_s * (1.0 - AT_LIMIT)]
     return replace(done, remarks=tuple(f"{name} is at its bound" for name in ends))
 
@@ -230,7 +219,7 @@ def _of_delays(late: FitResult, names: Sequence[str], count: int) -> Array:
     return np.asarray(0.5 * (part + part.T))
 
 
-def _converged(found: UsersFit) -> UsersFit:
+def _converged(found: LinearFit) -> LinearFit:
     if not near_its_optimum(found.result):
         raise IdentificationError(
             f"{found.method} does not converge on {found.result.model.name}; {MEMORY} is there"

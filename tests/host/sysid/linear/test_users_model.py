@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
+from host.sysid.linear.users_model import fit_by_evidence, fit_users_model
 from host.sysid.models import LinearModel, Maneuver, model_from
 from scipy import signal
 
