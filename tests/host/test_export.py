@@ -1,15 +1,18 @@
 """Every format gives back the table, with units where it has a place for them."""
 
 import importlib.util
+import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 from host.cli import main
-from host.export.csv import DECIMALS
+from host.export.csv import DECIMALS, rounded
 from host.physical.calibration import load_calibration
 from host.physical.columns import COLUMNS, UNITS
+from numpy.typing import NDArray
 from pyarrow import parquet
 from scipy.io import loadmat
 
@@ -108,3 +111,24 @@ def test_raw_frames_one_file_each(
     if kind == "parquet":
         field = parquet.read_schema("flight.frames/baro.parquet").field("static_pressure")
         assert field.metadata[b"unit"] == b"0.0625 Pa"
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+def test_the_largest_numbers_have_no_decimals_and_stay_what_they_are(kind: type) -> None:
+    unit, decimals = max(DECIMALS.items(), key=lambda item: item[1])
+    most = np.finfo(kind).max
+    values: NDArray[Any] = np.array([most, -most, most / 10, np.nan, np.inf, 1.23456789], kind)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        told = rounded({"x": values}, {"x": unit})["x"]
+    expected = values.copy()
+    expected[-1] = np.round(values[-1], decimals)
+    np.testing.assert_array_equal(told, expected)
+    assert told.dtype == kind
+
+
+def test_a_signalling_nan_is_a_missing_value() -> None:
+    values = np.array([0x7FA00000], np.uint32).view(np.float32)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert np.isnan(rounded({"x": values}, {"x": "deg"})["x"]).all()

@@ -314,3 +314,9 @@ def test_fields_called_as_parts_of_a_format_are_columns_like_others(
     assert main(["decode", str(path), "--frames", "-o", str(target)]) in (0, 3)
     assert (tmp_path / f"flight.frames/more.{kind}").stat().st_size > 100
     assert main(["info", str(path)]) == 0
+
+
+@pytest.mark.parametrize("seed", [9274, 12412])
+def test_what_cannot_be_rounded_is_written_as_it_is(seed: int) -> None:
+    """A signalling NaN; a scale that makes values of 1e305."""
+    assert fuzz_log.main(["forged", "--seed", str(seed), "--count", "1", "--no-limit"]) == 0

@@ -98,11 +98,19 @@ class ArrowCsvWriter:
 def rounded(columns: Columns, units: Mapping[str, str]) -> Columns:
     """Return columns with the decimals that their sensors have; others as they are."""
     return {
-        name: np.round(value, DECIMALS[units[name]])
+        name: _rounded(value, DECIMALS[units[name]])
         if value.dtype.kind == "f" and units.get(name) in DECIMALS
         else value
         for name, value in columns.items()
     }
+
+
+def _rounded(values: NDArray[Any], decimals: int) -> NDArray[Any]:
+    # A value of a damaged log may be so large that its product with 10^decimals is infinite: it has
+    # no decimals. Or it is a signalling NaN.
+    with np.errstate(over="ignore", invalid="ignore"):
+        near = np.round(values, decimals)
+    return np.where(np.isfinite(near), near, values)
 
 
 def printable(columns: Columns) -> Columns:
