@@ -211,6 +211,7 @@ def _answer(
         parts.append(picture(model_histories(answer), f"{title}: {caption(answer)}"))
     else:
         parts.append(_pictures(figures, {"coefficients_fit": f"{title}: measured and model"}))
+    parts.append(_pictures(figures, {f"{label}_bode": f"{title}: frequency responses"}))
     parts.append(fit_table(numbers, at))
     parts.append("<h3>Parameters</h3>" + parameter_tables(numbers, at, label, causes))
     if found.prior is not None and numbers.document["answers"][at].get("coefficients"):

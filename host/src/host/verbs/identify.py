@@ -181,7 +181,7 @@ def _run(args: argparse.Namespace) -> int:
 def _asked_for(args: argparse.Namespace) -> list[str]:
     """Return what 'list' in place of a name shows; nothing where no list is asked for."""
     from host.readers.shipped_maps import LIST, map_lines
-    from host.sysid.checks.data_finding import check_lines
+    from host.sysid.checks import check_lines
     from host.sysid.pipeline.requested_models import method_lines, model_lines
 
     if LIST in (args.method or ()):

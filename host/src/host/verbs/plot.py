@@ -51,6 +51,20 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--from", dest="from_s", type=float, metavar="S", help="start of the picture"
     )
+    parser.add_argument(
+        "--bode",
+        action="store_true",
+        help="identify, and show frequency responses with coherence, the models over them, in"
+        " place of strips",
+    )
+    parser.add_argument("--aircraft", metavar="NAME", help="with --bode: as of `host identify`")
+    parser.add_argument(
+        "--model",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="with --bode: as of `host identify`; repeatable",
+    )
     parser.add_argument("--to", dest="to_s", type=float, metavar="S", help="end of the picture")
 
 
@@ -72,15 +86,9 @@ def flight_request(args: argparse.Namespace) -> Any:
 def run(args: argparse.Namespace) -> int:
     """Write the page, say where; return the exit code."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from host.report.plotting import PlotRequest, plot
     from host.text import shown
 
-    pictures = tuple(path for path in (args.png, args.svg) if path is not None)
-    strips = tuple(one for one in args.channels.split(",") if one)
-    request = PlotRequest(
-        flight_request(args), args.output, args.full, pictures, strips, (args.from_s, args.to_s)
-    )
-    done = plot(request)
+    done = _bode(args) if args.bode else _plot(args)
     print("\n".join(map(shown, done.lines)))
     pages = [path for path in done.files if path.suffix.lower() in (".html", ".htm")]
     if args.open and pages:
@@ -89,3 +97,35 @@ def run(args: argparse.Namespace) -> int:
         if not webbrowser.open(pages[-1].resolve().as_uri()):
             print(f"no browser answered: open {pages[-1]} yourself", file=sys.stderr)
     return int(done.exit_code)
+
+
+def _pictures(args: argparse.Namespace) -> tuple[Path, ...]:
+    return tuple(path for path in (args.png, args.svg) if path is not None)
+
+
+def _plot(args: argparse.Namespace) -> Any:
+    from host.errors import UsageError
+    from host.report.plotting import PlotRequest, plot
+
+    if args.aircraft or args.model:
+        raise UsageError("--aircraft and --model: only --bode fits a model")
+    strips = tuple(one for one in args.channels.split(",") if one)
+    span = (args.from_s, args.to_s)
+    return plot(
+        PlotRequest(flight_request(args), args.output, args.full, _pictures(args), strips, span)
+    )
+
+
+def _bode(args: argparse.Namespace) -> Any:
+    from host.errors import UsageError
+    from host.report.frequency_plotting import FrequencyRequest, plot_frequency
+    from host.sysid.pipeline.arguments import option_words
+
+    wanted = flight_request(args)
+    models = tuple(args.model)
+    try:
+        return plot_frequency(
+            FrequencyRequest(wanted, args.output, _pictures(args), args.aircraft, models)
+        )
+    except UsageError as error:
+        raise UsageError(option_words(str(error))) from error

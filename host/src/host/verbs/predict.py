@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     from host.readers.autopilot_flight import log_choices
     from host.readers.shipped_maps import LIST, map_lines
     from host.sysid.answer import OutputPaths, check_outputs
-    from host.sysid.checks.data_finding import check_lines
+    from host.sysid.checks import check_lines
     from host.sysid.flight import chosen_flights
     from host.sysid.models.named_models import shipped_lines
     from host.sysid.pipeline import predict

@@ -1,8 +1,10 @@
 """What pictures are made of: outputs beside outputs, degrees, the largest and the emptiest."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from host.arrays import Array
 from host.cli import main
@@ -19,7 +21,10 @@ from host.sysid.answer.figure_kinds import (
     shown,
     spectra,
 )
+from host.sysid.answer.frequency_pictures import frequency_pictures, pairs_of
+from host.sysid.checks import Finding
 from host.sysid.flight import read_columns
+from host.sysid.models import Maneuver
 
 from tests.host.sysid.at_hand import identify
 from tests.host.sysid.verdicts import verdict_of
@@ -83,3 +88,50 @@ def test_the_largest_and_the_emptiest_are_drawn(tmp_path: Path) -> None:
     ):
         path = save(figure, tmp_path / f"{number}.svg")
         assert path.read_text().rstrip().endswith("</svg>")
+
+
+def test_frequency_responses_are_drawn_with_their_band_and_warn_of_feedback(
+    tmp_path: Path, columns: dict[str, Array]
+) -> None:
+    (answer,) = identify(columns, names=("short-period",))
+    loop = Finding("feedback", (), "elevator_rad is a function of q_radps")
+    figures, lines = frequency_pictures([answer], [loop])
+    pairs, method = pairs_of(answer)
+    assert [(p.input, p.output) for p in pairs] == [
+        ("elevator_rad", "q_radps"),
+        ("elevator_rad", "az_mps2"),
+    ]
+    low, high = pairs[0].band_hz or (0.0, 0.0)
+    assert high / low > 4.0  # calm air: what the elevator moves is coherent beyond the short period
+    # What the model flies itself has the model's response: hold, delays and order are the same.
+    flown = [replace(m, outputs=y) for m, y in zip(answer.maneuvers, answer.simulated, strict=True)]
+    own = pairs_of(replace(answer, maneuvers=tuple(flown), held_out_runs=()))[0]
+    assert np.median(np.abs(np.log(own[0].recorded / own[0].model))) < 0.05
+    words = save(figures[0], tmp_path / "bode.svg").read_text()
+    assert method in words and "elevator to az, m/s2 per deg" in words
+    assert any("controller's inverse" in line for line in lines) and "controller" in words
+    assert not any("inverse" in line for line in frequency_pictures([answer])[1])
+    still = replace(answer, maneuvers=(_short(answer.maneuvers[0]),), held_out_runs=())
+    assert frequency_pictures([still])[0] == []
+    assert "fly a longer input" in frequency_pictures([still])[1][0]
+
+
+def _short(maneuver: Maneuver) -> Maneuver:
+    cut = {n: getattr(maneuver, n)[:12] for n in ("inputs", "outputs")}
+    return Maneuver(maneuver.dt_s, name="short", **cut)
+
+
+def test_host_plot_bode_writes_a_page_and_pictures(
+    tmp_path: Path, columns: dict[str, Array], capsys: pytest.CaptureFixture[str]
+) -> None:
+    pd.DataFrame(columns).to_csv(tmp_path / "flight.csv", index=False)
+    asked = ["plot", str(tmp_path / "flight.csv"), "--bode", "--model", "short-period"]
+    assert main([*asked, "--png", str(tmp_path / "band.png")]) == 0
+    assert "elevator to q: coherence above 0.6 from" in capsys.readouterr().out
+    assert (tmp_path / "band.png").read_bytes().startswith(b"\x89PNG")
+    assert main([*asked, "-o", str(tmp_path / "band.html")]) == 0
+    page = (tmp_path / "band.html").read_text()
+    assert page.count("<img") == 1 and "chirp-z" in page and "<script" not in page
+    assert main([*asked, "--png", str(tmp_path / "band.pdf")]) == 2
+    assert main(["plot", str(tmp_path / "flight.csv"), "--model", "short-period"]) == 2
+    assert "only --bode fits a model" in capsys.readouterr().err

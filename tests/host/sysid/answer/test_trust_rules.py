@@ -8,7 +8,7 @@ from host.sysid.answer import CAREFUL, TRUSTED, answer_document
 from host.sysid.answer.doubt import Evidence
 from host.sysid.answer.linear_rules import driven_by_inputs
 from host.sysid.answer.servo_lines import servo_document
-from host.sysid.checks.data_finding import Finding
+from host.sysid.checks import Finding
 from host.sysid.estimators.servo_parameters import SERVO, ServoEstimate, ServoNumber
 from host.sysid.linear import Answer
 from host.sysid.models import Trim, template

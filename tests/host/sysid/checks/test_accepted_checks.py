@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 from host.cli import main
 from host.readers.even_grid import USED
-from host.sysid.checks.data_finding import CHECKS
+from host.sysid.checks import CHECKS
 from host.sysid.flight import read_flight_columns
 
 from tests.host.readers.autopilot_flights import write

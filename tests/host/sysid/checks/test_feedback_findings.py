@@ -14,7 +14,7 @@ from host.sysid.answer.coefficient_view import CoefficientView
 from host.sysid.answer.doubt import Evidence
 from host.sysid.answer.feedback_pairs import alike_derivatives, combined_derivatives
 from host.sysid.answer.trust_rules import input_feedback
-from host.sysid.checks.data_finding import Feedback, Finding
+from host.sysid.checks import Feedback, Finding
 from host.sysid.checks.feedback_findings import feedback_findings
 from host.sysid.coefficients import CoefficientAnswer
 from host.sysid.flight import read_flight_columns

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from host.errors import IdentificationError
 from host.sysid import FitResult, Maneuver, fit, methods
-from host.sysid.estimators.frequency_domain import transform
 from host.sysid.estimators.kalman import innovation_inflation
+from host.sysid.numerics.chirp_z import transform
 from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.output_error import minimise
 from host.sysid.numerics.output_error_problem import OutputProblem

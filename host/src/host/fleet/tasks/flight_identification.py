@@ -26,7 +26,7 @@ from host.fleet.tasks.surface_response import surface_quantities
 from host.fleet.tasks.vane_zeros import vane_zeros
 from host.instrument.error_sources import AIRCRAFT_FILE, TYPE
 from host.sysid.answer import doubted_by_findings
-from host.sysid.checks.data_finding import finding_document
+from host.sysid.checks import finding_document
 from host.sysid.coefficients import CoefficientFit
 from host.sysid.pipeline import Identification, identify
 from host.sysid.reconstruction.sensor_dynamics import SERVO_DELAY

@@ -20,6 +20,7 @@ from host.sysid.answer.figure_kinds import (
     save,
     spectra,
 )
+from host.sysid.answer.frequency_pictures import frequency_pictures
 from host.sysid.answer.marks import UNSURE, USELESS, Verdict
 from host.sysid.answer.mat_file import labels
 from host.sysid.answer.truth_comparison import true_coefficients, true_poles
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from host.arrays import Array
+    from host.sysid.checks.data_finding import Finding
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
     from host.sysid.linear.linear_answer import Answer
     from host.sysid.models.modal_analysis import Mode
@@ -47,6 +49,7 @@ def draw_all(
     verdicts: Sequence[Verdict],
     flights: Sequence[Mapping[str, Array]],
     truth: dict[str, Any] | None = None,
+    findings: Sequence[Finding] = (),
 ) -> dict[str, Figure]:
     """Return the pictures of several answers by name; of one model by several methods apart.
 
@@ -60,6 +63,8 @@ def draw_all(
         Columns of what the coefficients were made of; surfaces give the spectrum of the inputs.
     truth : dict, optional
         Truth file of a simulated flight, drawn beside the intervals.
+    findings : sequence of Finding
+        Those of feedback are named under a frequency response.
 
     Raises
     ------
@@ -68,7 +73,7 @@ def draw_all(
     """
     found: dict[str, Figure] = {}
     for answer, label, verdict in zip(answers, labels(answers), verdicts, strict=False):
-        found |= draw(answer, label, verdict, truth)
+        found |= draw(answer, label, verdict, truth, findings)
     return found | (draw_coefficients(direct, flights, truth) if direct else {})
 
 
@@ -79,11 +84,16 @@ def save_all(pictures: Mapping[str, Figure], folder: Path) -> list[Path]:
 
 
 def draw(
-    answer: Answer, name: str, verdict: Verdict, truth: dict[str, Any] | None = None
+    answer: Answer,
+    name: str,
+    verdict: Verdict,
+    truth: dict[str, Any] | None = None,
+    findings: Sequence[Finding] = (),
 ) -> dict[str, Figure]:
     """Return all pictures of one answer, their names beginning with `name`.
 
-    `truth` of a simulated flight is marked on the map of poles.
+    `truth` of a simulated flight is marked on the map of poles. Frequency responses are missing
+    where the records are too short for coherence.
 
     Raises
     ------
@@ -126,7 +136,7 @@ def draw(
         ),
         f"{name}_intervals": interval_bars(bars, about),
         f"{name}_input": spectra(inputs, _hertz(answer.modes), f"{answer.template}: {EXCITED}"),
-    }
+    } | {f"{name}_bode": figure for figure in frequency_pictures([answer], findings)[0]}
 
 
 def draw_coefficients(

@@ -111,7 +111,7 @@ def histories(
     inputs = inputs or {}
     rows = len(signals)
     count = max((len(traces) for traces in signals.values()), default=1)
-    figure = _figure((max(9.0, 1.1 * count), 2.2 * rows + 1.1 * len(inputs)))
+    figure = empty_figure((max(9.0, 1.1 * count), 2.2 * rows + 1.1 * len(inputs)))
     heights = [3, 1] * rows + [2] * len(inputs)
     panels = figure.subplots(len(heights), 1, squeeze=False, height_ratios=heights)
     axes = list(panels[:, 0])
@@ -172,7 +172,7 @@ def _broken(title: str) -> str:
 def pole_map(clouds: Sequence[Cloud], title: str) -> Figure:
     """Draw all poles, and each mode with its scatter in a panel of its own scale."""
     rows = (len(clouds) + 1) // 2
-    figure = _figure((8.0, 3.4 + 2.4 * rows))
+    figure = empty_figure((8.0, 3.4 + 2.4 * rows))
     grid = figure.add_gridspec(1 + rows, 2, height_ratios=[3] + [2] * rows)
     overview = figure.add_subplot(grid[0, :])
     for cloud in clouds:
@@ -214,7 +214,7 @@ def interval_bars(bars: Sequence[Bar], title: str) -> Figure:
     A disc stands on a bar whose scale is the estimate, a hollow square on one whose scale is what
     would contribute 5 % of its row's largest.
     """
-    figure = _figure((8.5, 0.32 * len(bars) + 1.8))
+    figure = empty_figure((8.5, 0.32 * len(bars) + 1.8))
     axis = figure.subplots()
     widest = max((100.0 * b.half_width / b.scale for b in bars), default=0.0)
     reach = float(np.clip(1.15 * widest, 15.0, REACH))
@@ -260,7 +260,7 @@ def interval_bars(bars: Sequence[Bar], title: str) -> Figure:
 def spectra(inputs: Sequence[Excitation], modes: Sequence[tuple[str, float]], title: str) -> Figure:
     """Draw the spectra of inputs and the modes, name and Hz, that they should excite."""
     lines = (len(inputs) + 1) // 2
-    figure = _figure((8.0, 4.2 + 0.16 * lines))
+    figure = empty_figure((8.0, 4.2 + 0.16 * lines))
     axis = figure.subplots()
     for number, item in enumerate(inputs):
         series = np.degrees(item.values - item.values.mean())
@@ -329,7 +329,7 @@ def _cloud(axis: Axes, cloud: Cloud, *, mirrored: bool = True) -> None:
             axis.plot(*at, "D", color=TRUTH, ms=6, mfc="none")
 
 
-def _figure(size: tuple[float, float]) -> Figure:
+def empty_figure(size: tuple[float, float]) -> Figure:
     """Return an empty figure.
 
     Raises

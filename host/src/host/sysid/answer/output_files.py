@@ -14,6 +14,7 @@ from host.extras import install_hint
 from host.sysid.answer.mat_file import labels, write_answers
 from host.sysid.answer.settling_history import has_history, write_history
 from host.sysid.answer.simulator_forms import CONTROL, FORMS, files_of, form_of, write_form
+from host.sysid.checks.data_finding import Finding
 from host.sysid.estimators.method_registry import all_methods
 
 if TYPE_CHECKING:
@@ -137,6 +138,7 @@ def write_outputs(
     verdicts: Sequence[Verdict],
     flights: Sequence[Mapping[str, Array]],
     truth: dict[str, Any] | None,
+    findings: Sequence[Finding] = (),
 ) -> list[Path]:
     """Write everything asked for and return the files.
 
@@ -154,6 +156,8 @@ def write_outputs(
         Columns of each, whose surfaces give the spectrum of the inputs.
     truth : dict or None
         Of a simulated flight, for the pictures.
+    findings : sequence of Finding
+        Of the data, for the pictures.
 
     Raises
     ------
@@ -174,7 +178,8 @@ def write_outputs(
     if places.plots is not None:
         from host.sysid.answer.answer_figures import draw_all, save_all
 
-        written += save_all(draw_all(answers, direct, verdicts, flights, truth), places.plots)
+        drawn = draw_all(answers, direct, verdicts, flights, truth, findings)
+        written += save_all(drawn, places.plots)
     return written
 
 

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import signal
 
 from host.arrays import Array
 from host.errors import IdentificationError
@@ -16,31 +14,14 @@ from host.sysid.estimators.start_values import start_values_of
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
+from host.sysid.numerics.chirp_z import Spectrum, transform
 from host.sysid.numerics.differentiation import signal_bandwidth_hz
 from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.gauss_newton import Objective, gauss_newton
 from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.output_error_problem import check_shapes
 
-Spectrum = NDArray[np.complexfloating]
 MAX_ITERATIONS = 40
-
-
-def transform(values: Array, dt_s: float, frequency_hz: Array) -> Spectrum:
-    """Return the sums of values exp(-j w t) at evenly spaced frequencies, (frequencies, columns).
-
-    EQUATIONS.md, eq. 20, by chirp-z transform: Morelli, NASA TM-1999-209120.
-    """
-    spacing = frequency_hz[1] - frequency_hz[0]
-    return np.asarray(
-        signal.czt(
-            values,
-            m=len(frequency_hz),
-            w=np.exp(-2j * np.pi * spacing * dt_s),
-            a=np.exp(2j * np.pi * frequency_hz[0] * dt_s),
-            axis=0,
-        )
-    )
 
 
 def band(

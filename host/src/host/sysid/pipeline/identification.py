@@ -23,6 +23,7 @@ from host.sysid.reconstruction.reconstruction import Compatibility
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
     from host.aircraft.prior.prior_table import PriorTable
     from host.sysid.aerodynamics.coefficient_table import CoefficientTable
@@ -125,7 +126,21 @@ class Identification:
 
         recorded = [flight.recorded for flight in self.flights]
         made = self.linear, self.coefficients, self.verdicts
-        return Pictures(draw_all(*made, recorded, self.truth))
+        return Pictures(draw_all(*made, recorded, self.truth, self.findings))
+
+    def frequency(self) -> tuple[list[Figure], list[str]]:
+        """Return one picture of the frequency responses of all linear models, and it in words.
+
+        No picture, and why in a line, where records are too short.
+
+        Raises
+        ------
+        IdentificationError
+            If matplotlib is missing.
+        """
+        from host.sysid.answer.frequency_pictures import frequency_pictures
+
+        return frequency_pictures(self.linear, self.findings)
 
     def simulate(
         self,
@@ -231,7 +246,13 @@ class Identification:
         check_outputs(places)
         recorded = [flight.recorded for flight in self.flights]
         return write_outputs(
-            places, self.linear, self.coefficients, self.verdicts, recorded, self.truth
+            places,
+            self.linear,
+            self.coefficients,
+            self.verdicts,
+            recorded,
+            self.truth,
+            self.findings,
         )
 
     def __str__(self) -> str:
