@@ -211,6 +211,10 @@ class Identification:
             comparison with a truth or a prior that was given.
         """
         lines = [*self.judgement, *(removed_error_lines(self.linear) if full else ())]
+        if any(self.agreements):
+            from host.sysid.answer.pitot_parameter import pitot_lines
+
+            lines += pitot_lines(self.flights, self.agreements)
         lines += self._numbers(width) if full else ["", *self._short(width)]
         if self.prior is not None or self.truth is not None:
             from host.sysid.pipeline.whole_answer import compared_lines

@@ -91,6 +91,19 @@ def _density_beside_airspeed(found: Compatibility) -> float:
     return float(np.sqrt(pressure_share(found))) * density_share(found.instrument)
 
 
+def pressure_scale(found: Compatibility) -> tuple[float, float] | None:
+    """Return the share by which dynamic pressure reads high, and its 95 % half-width.
+
+    None where the data do not tell the pitot's scale; what of it is density is not in it, and its
+    uncertainty is.
+    """
+    scale = next((f for f in found.findings if f.name == "pitot_scale" and f.data_informed), None)
+    if scale is None:
+        return None
+    part, beside = pressure_share(found), NORMAL_95 * _density_beside_airspeed(found)
+    return part * scale.value, float(np.hypot(part * scale.half_width, beside))
+
+
 def correct_columns(
     columns: Mapping[str, Array], errors: Mapping[str, float], part: float = 1.0
 ) -> dict[str, Array]:
