@@ -7,7 +7,7 @@ from typing import cast
 
 import numpy as np
 import pytest
-from host.sysid.estimators.coherence_inflation import COUNTED, inflate_by_coherence
+from host.sysid.estimators.coherence_inflation import driven_by_inputs
 from host.sysid.estimators.gust_penetration import PREFIX, with_gust_penetration
 from host.sysid.models import FitResult, Trim, template
 from host.sysid.numerics.input_coherence import InputCoherence
@@ -39,12 +39,12 @@ def test_the_parameters_of_the_gust_are_left_out() -> None:
     result = _fitted("innovation")
     model = result.model
     found = _coherent(len(model.parameters), 1.0, 4.0, 0.5)
-    wide = inflate_by_coherence(result, result.uncertainty, found)
-    factor = np.asarray(wide.details[COUNTED])
+    noise = result.uncertainty
+    wide = noise.with_model_error([driven_by_inputs(result, noise, found)])
+    factor = np.sqrt(wide.variance)
     gust = np.array([name.startswith(PREFIX) for name in model.parameter_names])
     assert gust.any()
     assert np.all(factor[gust] == 1.0)
-    assert np.allclose(np.diag(wide.covariance)[gust], 1.0)
     assert np.allclose(factor[~gust], np.sqrt(4.25))
     assert np.all(np.isinf(wide.degrees_of_freedom[gust]))
     assert PREFIX not in " ".join(wide.warnings).replace("filter error with gust", "")
@@ -57,6 +57,7 @@ def test_the_bias_of_a_free_simulation_counts_in_its_own_deviations(
     """One that knows ten times less is biased by as much more: N_r was widened 38 times for 1 %."""
     result = _fitted(kind)
     found = _coherent(len(result.model.parameters), 100.0, 4.0, 1.0)
-    wide = inflate_by_coherence(result, result.uncertainty, found)
+    noise = result.uncertainty
+    wide = noise.with_model_error([driven_by_inputs(result, noise, found)])
     k = result.index("M_alpha")
     assert wide.covariance[k, k] == pytest.approx(expected)

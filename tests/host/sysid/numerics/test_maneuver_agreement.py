@@ -5,7 +5,7 @@ import pytest
 from host.sysid import FitResult, Maneuver, fit
 from host.sysid.numerics.maneuver_agreement import (
     ManeuverAgreement,
-    inflate_covariance,
+    disagreement,
     maneuver_agreement,
 )
 from host.sysid.numerics.output_error_problem import OutputProblem
@@ -43,7 +43,7 @@ def test_an_aircraft_that_changes_is_named_and_its_interval_widened(method: str)
     result = flown(0, 0.1, method=method)
     found = agreement(result)
     assert found is not None
-    wide = result.with_uncertainty(inflate_covariance(result.uncertainty, found))
+    wide = result.with_uncertainty(result.uncertainty.with_model_error([disagreement(found)]))
     assert found.p_value[PLACE] < 1e-3
     assert found.factor[PLACE] > 2.0
     assert wide.standard_error[PLACE] == pytest.approx(
@@ -59,4 +59,4 @@ def test_one_maneuver_says_nothing_of_scatter() -> None:
     result = fit("output-error", MODEL.with_start(TRUTH), [noisy(1, 0.05)])
     assert agreement(result) is None
     known = result.uncertainty
-    assert inflate_covariance(known, None) is known
+    assert known.with_model_error([disagreement(None)]) is known

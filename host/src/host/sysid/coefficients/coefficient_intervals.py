@@ -41,6 +41,7 @@ from host.sysid.coefficients.trim_derivatives import (
     zero_lift_drag,
 )
 from host.sysid.models.consider_covariance import consider_covariance
+from host.sysid.models.uncertainty import Uncertainty
 from host.sysid.numerics.maneuver_agreement import ManeuverAgreement, scatter_test
 
 # One deviation of the error that instrumental variables leave, as a share of what they moved. A
@@ -181,7 +182,8 @@ def intervals(search: SearchResult) -> CoefficientIntervals:
         tuple(values),
         *maneuver_influence(final, problem.windows, jacobian[: len(values)] @ gain_complement),
     )
-    joint[np.diag_indices(len(values))] += agreement.extra_variance
+    known = Uncertainty(joint, np.full(len(joint), np.inf))
+    joint = known.with_model_error([agreement.in_normal_quantiles]).covariance
     updated = (gain_complement @ search.error_shifts).T
     state_shifts = dict(zip(problem.error_names, updated, strict=True)) | arm_shifts
     shifts = {name: jacobian[: len(values)] @ shift for name, shift in state_shifts.items()}

@@ -27,6 +27,7 @@ from host.sysid.coefficients.coefficient_fit import (
 )
 from host.sysid.coefficients.deletion_diagnostics import CrossValidation
 from host.sysid.models.consider_covariance import consider_covariance
+from host.sysid.models.uncertainty import Uncertainty
 from host.sysid.numerics.maneuver_agreement import ManeuverAgreement, scatter_test
 
 LEAST_EIGENVALUE = 1e-12  # of the largest; below it is rounding
@@ -97,8 +98,8 @@ def _pooled(fits: Sequence[CoefficientFit], has: Array) -> tuple[Array, Array, M
     names = tuple(d.name for d in fits[0].derivatives)
     agreement = scatter_test(names, influence, weight[:, :count], expected)
     covariance += consider_covariance(np.einsum("ki,kij->ji", weight, common))
-    covariance[np.diag_indices(count)] += agreement.extra_variance
-    return state, covariance, agreement
+    known = Uncertainty(covariance, np.full(len(covariance), np.inf))
+    return state, known.with_model_error([agreement.in_normal_quantiles]).covariance, agreement
 
 
 def _pooled_derivatives(

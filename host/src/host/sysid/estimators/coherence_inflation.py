@@ -6,19 +6,17 @@ drive the residual (`numerics.input_coherence`), its power above noise counts in
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from host.arrays import Array
 from host.sysid.estimators.gust_penetration import PREFIX
-from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
-from host.sysid.models.uncertainty import Uncertainty
+from host.sysid.models.uncertainty import ModelError, Uncertainty
 from host.sysid.numerics.input_coherence import InputCoherence
 
 REPORTED_FACTOR = 1.05  # times wider
-COUNTED = "driven_by_inputs"  # among the details of a result that was widened
 
 
 @dataclass(frozen=True)
@@ -37,18 +35,18 @@ class NoiseExcess:
     variance_ratio: Array
 
 
-def inflate_by_coherence(
+def driven_by_inputs(
     result: FitResult,
-    known: Uncertainty,
+    noise: Uncertainty,
     found: InputCoherence | None,
     excess: NoiseExcess | None = None,
-) -> Uncertainty:
-    """Return a covariance that holds what the inputs drive beside the model.
+) -> ModelError | None:
+    """Return what the inputs drive beside the model.
 
-    They are widened where that is suspected at 10 %, and it is said at 1 %. The bias by the error
-    that the residual looks most like is a consider covariance: of output error as it is, of other
-    methods in deviations of a free simulation, whose bias it is. In gusts that knows N_r eight
-    times worse than the filter, which its bias of 30 % would widen 38 times for an error of 1 %.
+    Intervals hold it where it is suspected at 10 %, and it is said at 1 %. The bias by the error
+    that the residual looks most like is a shift: of output error as it is, of other methods in
+    deviations of a free simulation, whose bias it is. In gusts that knows N_r eight times worse
+    than the filter, which its bias of 30 % would widen 38 times for an error of 1 %.
 
     Output error is widened to the covariance of that residual, other methods by its ratio to the
     covariance in noise alone, or by what a residual larger than they predict makes of each
@@ -58,40 +56,38 @@ def inflate_by_coherence(
     Parameters
     ----------
     result : FitResult
-    known : Uncertainty
-        What was not known of it without.
+    noise : Uncertainty
+        What noise leaves open of it.
     found : InputCoherence or None
-        Of its free simulation. Nothing changes without, or if no output is coherent.
+        Of its free simulation. None is returned without, or if no output is coherent.
     excess : NoiseExcess, optional
         Outputs whose residual is larger than the fit's own noise and gust model predicts.
     """
-    if found is None or not (found.suspected or excess) or COUNTED in known.details:
-        return known
+    if found is None or not (found.suspected or excess):
+        return None
     count = len(result.model.parameter_names)
-    own = known.variance[:count]
+    own = noise.variance[:count]
     wide = np.diag(found.widened_covariance())[:count]
     moved = found.shift[:count]
-    if result.residual_kind == "output":
-        ratio = wide / np.maximum(own, 1e-300)
-    else:
+    least, factor = wide, np.ones(count)
+    if result.residual_kind != "output":
         simulated = np.maximum(np.diag(found.covariance())[:count], 1e-300)
         ratio = wide / simulated
-        moved = moved * np.sqrt(own / simulated)
         if excess is not None:
             ratio = np.maximum(ratio, excess.variance_ratio[:count])
+        least, factor = np.zeros(count), np.sqrt(np.maximum(ratio, 1.0))
+        moved = moved * np.sqrt(own / simulated)
     # What gusts do is no derivative: the model of the gust is not what the inputs drive.
-    own = np.where([n.startswith(PREFIX) for n in result.names[:count]], 0.0, own)
-    larger = known.times(np.where(own > 0.0, np.sqrt(np.maximum(ratio, 1.0)), 1.0))
-    shift = np.where(own > 0.0, moved, 0.0)
-    wider = larger.plus(consider_covariance(shift[None]))
-    factor = np.ones(len(wider.covariance))
-    factor[:count] = np.sqrt(wider.variance[:count] / np.where(own > 0.0, own, 1.0))
-    factor[:count] = np.where(own > 0.0, factor[:count], 1.0)
+    known = (own > 0.0) & [not n.startswith(PREFIX) for n in result.names[:count]]
+    factor = np.where(known, factor, 1.0)
+    least, shift = (np.where(known, x, 0.0) for x in (least, moved))
+    larger = np.maximum(factor**2 * own, least) + shift**2
+    total = np.sqrt(larger / np.where(known, own, 1.0), where=known, out=np.ones(count))
     pairs = zip(found.outputs, found.columns, strict=True)
-    columns = [float(c) for n, c in pairs if n in found.suspected]
-    widened, freedom = np.flatnonzero(factor > 1.0), min(columns, default=np.inf)
-    wider = wider.of_a_sample(widened, freedom, *_lines(result, found, factor, excess))
-    return replace(wider, details={**wider.details, COUNTED: factor})
+    columns = min((float(c) for n, c in pairs if n in found.suspected), default=np.inf)
+    freedom = np.where(total > 1.0, columns, np.inf)
+    lines = _lines(result, found, total, excess)
+    return ModelError(factor, least, shift, freedom=freedom, warnings=tuple(lines))
 
 
 def widened_to(known: Uncertainty, variance: Array) -> Uncertainty:

@@ -16,11 +16,10 @@ from scipy import special
 from host.arrays import Array
 from host.sysid.estimators.gust_model import driven_model
 from host.sysid.estimators.innovations import driven_states, score_covariances
-from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term, has_equations
-from host.sysid.models.uncertainty import Uncertainty
+from host.sysid.models.uncertainty import ModelError, Uncertainty
 from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.information_inverse import identified_inverse
 
@@ -112,14 +111,14 @@ def missing_control(
     return MissingControl(tuple(said), (moved @ effect)[:first])
 
 
-def widened_by_missing_control(known: Uncertainty, found: MissingControl | None) -> Uncertainty:
-    """Return a covariance that holds what the absent effects moved, and a line."""
+def absent_effects(noise: Uncertainty, found: MissingControl | None) -> ModelError | None:
+    """Return what the absent effects moved, and a line; None where nothing is absent."""
     if found is None:
-        return known
-    own = known.variance[: len(found.shift)] > 0.0
+        return None
+    own = noise.variance[: len(found.shift)] > 0.0
     where = ", ".join(found.where) or "the outputs"
     line = f"the inputs act where the model has no effect of theirs ({where}): intervals widened"
-    return known.plus(consider_covariance((found.shift * own)[None]), line)
+    return ModelError(shift=found.shift * own, warnings=(line,))
 
 
 def _absent_entries(model: LinearModel) -> list[tuple[str, int, int]]:

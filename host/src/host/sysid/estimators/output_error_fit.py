@@ -8,7 +8,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.sysid.estimators.coherence_inflation import inflate_by_coherence
+from host.sysid.estimators.coherence_inflation import driven_by_inputs
 from host.sysid.estimators.output_error_ar_noise import (
     HIGHEST_ORDER,
     ArNoiseFit,
@@ -39,6 +39,7 @@ def fit_output_error(
     criterion: str = "bic",
     multiple_starts: bool = True,
     restarts: bool = True,
+    model_error: bool = True,
 ) -> FitResult:
     """Fit by output error.
 
@@ -55,6 +56,8 @@ def fit_output_error(
         Whole start vector; by default from equation error.
     highest_order, criterion, multiple_starts, restarts
         See `fit_with_ar_noise`.
+    model_error : bool
+        Hold what the inputs drive beside the model; without, noise alone.
 
     Raises
     ------
@@ -109,10 +112,11 @@ def fit_output_error(
             **_maneuver_influence(problem, fit),
         },
     )
-    if coherence is None:
+    if coherence is None or not model_error:
         return result
-    known = inflate_by_coherence(result, result.uncertainty, coherence)
-    return result.with_uncertainty(known)
+    known = result.uncertainty
+    lacks = driven_by_inputs(result, known, coherence)
+    return result.with_uncertainty(known.with_model_error([lacks]))
 
 
 def sample_periods(maneuvers: Sequence[Maneuver]) -> list[float]:

@@ -101,7 +101,7 @@ def _template(columns: PreparedColumns, options: Mapping[str, object]) -> Linear
     lost = chosen.method == GUST and not chosen.gust_is_state
     single = f"{OUTPUT_ERROR}-white" if lost else chosen.method
     if single.startswith(OUTPUT_ERROR):
-        options = {"multiple_starts": False, **options}
+        options = {"multiple_starts": False, "model_error": False, **options}
     beside = None
     if chosen.gust_is_state or single.startswith(OUTPUT_ERROR):
         beside = fit_beside_left_out(single, columns, options)

@@ -26,9 +26,9 @@ from host.sysid.errors.systematic_errors import (
     systematic_error_shifts,
     systematic_residuals,
 )
-from host.sysid.estimators.coherence_inflation import inflate_by_coherence, widened_to
+from host.sysid.estimators.coherence_inflation import driven_by_inputs, widened_to
 from host.sysid.estimators.gust_penetration import with_unknown_roll_lag
-from host.sysid.estimators.missing_control import missing_control, widened_by_missing_control
+from host.sysid.estimators.missing_control import absent_effects, missing_control
 from host.sysid.flight.filter_step import others_recorded
 from host.sysid.linear.linear_stages import LinearEstimate, LinearIntervals
 from host.sysid.maneuvers.pilot_takeover import taken_over
@@ -36,7 +36,7 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.uncertainty import Uncertainty
 from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
-from host.sysid.numerics.maneuver_agreement import inflate_covariance, maneuver_agreement
+from host.sysid.numerics.maneuver_agreement import disagreement, maneuver_agreement
 from host.sysid.numerics.score_variance import white_fit_variance
 from host.sysid.reconstruction.reconstruction import Compatibility
 from host.sysid.reconstruction.sensor_dynamics import DELAYED_COLUMNS, IMU_DELAY, SERVO_DELAY
@@ -119,7 +119,7 @@ def _with_model_error(
     coherence: InputCoherence | None,
     at_trim: Sequence[Maneuver],
 ) -> Uncertainty:
-    """Return noise, and what the model lacks: all that three tests say of it, none of another's.
+    """Return noise, and what the model lacks by three tests.
 
     `scattering` is the noise that makes maneuvers disagree.
     """
@@ -127,9 +127,13 @@ def _with_model_error(
     scatter = maneuver_agreement(e.fit.model.parameter_names, scattering)
     excess = None if free is None else excess_over_noise_model(free, e.fit, airspeed_mps)
     absent = missing_control(e.fit, at_trim, airspeed_mps)
-    known = inflate_covariance(noise, scatter)
-    known = inflate_by_coherence(e.fit, known, coherence, excess)
-    return widened_by_missing_control(known, absent)
+    return noise.with_model_error(
+        [
+            disagreement(scatter),
+            driven_by_inputs(e.fit, noise, coherence, excess),
+            absent_effects(noise, absent),
+        ],
+    )
 
 
 def _coherence(

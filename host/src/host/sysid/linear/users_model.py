@@ -65,7 +65,8 @@ def fit_users_model(
         return _gust_fit(model, maneuvers, airspeed_mps)
     if method == FILTER:
         return _filter_fit(model, maneuvers, options)
-    single = {"multiple_starts": False} if method.startswith(MEMORY) else {}
+    own = method.startswith(MEMORY)
+    single = {"multiple_starts": False, "model_error": False} if own else {}
     return _found(method, fit(method, model, maneuvers, **{**single, **options}), (*maneuvers,))
 
 

@@ -1,13 +1,50 @@
-"""What is not known of an estimate: a covariance that every cause makes larger."""
+"""What is not known of an estimate: a covariance that every cause makes larger.
+
+Repeated maneuvers that disagree, residuals that the inputs drive and effects of inputs that are
+absent may show one error of a model. Each test speaks of the noise alone (`ModelError`), never of
+what another made of it, so that nothing depends on which is heard first.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from host.arrays import Array, IntArray
+from host.sysid.models.consider_covariance import consider_covariance
+
+
+def _none() -> Array:
+    return np.zeros(0)
+
+
+@dataclass(frozen=True)
+class ModelError:
+    """What one test says that a model lacks, of the first parameters; what is empty says nothing.
+
+    Attributes
+    ----------
+    factor : Array, shape (k,)
+        By which each deviation is too small.
+    least : Array, shape (k,)
+        Variance that each has at least.
+    shift : Array, shape (k,)
+        By how much each estimate may be off, one deviation.
+    variance : Array, shape (k,)
+        What each has beside that of noise.
+    freedom : Array, shape (k,)
+        Most degrees of freedom; infinite where the test says nothing.
+    warnings : tuple of str
+    """
+
+    factor: Array = field(default_factory=_none)
+    least: Array = field(default_factory=_none)
+    shift: Array = field(default_factory=_none)
+    variance: Array = field(default_factory=_none)
+    freedom: Array = field(default_factory=_none)
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,3 +89,38 @@ class Uncertainty:
         own = self.degrees_of_freedom.copy()
         own[places] = np.minimum(own[places], np.maximum(freedom, 1.0))
         return replace(self, degrees_of_freedom=own, warnings=(*self.warnings, *warnings))
+
+    def with_model_error(self, found: Sequence[ModelError | None]) -> Uncertainty:
+        """Return the same with what the model lacks, this being noise.
+
+        Deviations grow by the product of all factors, then to the largest variance that any test
+        asks for at least. Shifts have directions of their own and are consider covariances;
+        variances add up; degrees of freedom are the fewest. The numbers do not depend on the order
+        of the tests.
+
+        Parameters
+        ----------
+        found : sequence of ModelError or None
+            None: a test that found nothing.
+        """
+        said = [one for one in found if one is not None]
+        if not said:
+            return self
+        count = len(self.covariance)
+        factor = np.prod([_wide(one.factor, count, 1.0) for one in said], axis=0)
+        least = np.max([_wide(one.least, count, 0.0) for one in said], axis=0)
+        own = np.where(self.variance > 0.0, self.variance, np.inf)  # what is certain stays so
+        factor = np.maximum(factor, np.sqrt(least / own))
+        shifts = np.stack([_wide(one.shift, count, 0.0) for one in said])
+        variance = np.sum([_wide(one.variance, count, 0.0) for one in said], axis=0)
+        freedom = np.min([_wide(one.freedom, count, np.inf) for one in said], axis=0)
+        lines = (line for one in said for line in one.warnings)
+        known = self.times(factor).plus(consider_covariance(shifts) + np.diag(variance), *lines)
+        return known.of_a_sample(np.arange(count), freedom)
+
+
+def _wide(values: Array, count: int, rest: float) -> Array:
+    """Return values of the first parameters, and what the rest has, (count,)."""
+    every = np.full(count, rest)
+    every[: len(values)] = values
+    return every

@@ -1,11 +1,11 @@
-"""Test whether repeated maneuvers agree; inflate the covariance of their joint estimate if not.
+"""Test whether repeated maneuvers agree, and say by how much their joint estimate is open if not.
 
 The influence of maneuver i on the joint estimate is d_i = P g_i, with P the inverse information and
 g_i the score of the maneuver alone (Belsley, Kuh & Welsch, Regression Diagnostics, 1980). All d_i
 sum to zero. If the covariance is right, the sum of d_i^2 estimates variance times 1 - sum w_i^2,
 with w_i the maneuver's share of the information. Where a chi-square test rejects that at 1 %, the
-covariance is multiplied by the square of the Birge ratio (Birge, Physical Review 40, 1932) and the
-interval gets a t quantile for as many maneuvers. A covariance never becomes smaller.
+deviation grows by the Birge ratio (Birge, Physical Review 40, 1932) and the interval gets a t
+quantile for as many maneuvers (`models/uncertainty.py`). A covariance never becomes smaller.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import special
 
+from host.sysid.models.uncertainty import ModelError, Uncertainty
+
 if TYPE_CHECKING:
     from host.arrays import Array
-    from host.sysid.models.uncertainty import Uncertainty
 
 SIGNIFICANCE = 0.01
 MIN_EFFECTIVE_MANEUVERS = 1.5  # effective number that inform a parameter, for a test
@@ -50,12 +51,17 @@ class ManeuverAgreement:
     variance: Array
 
     @property
-    def extra_variance(self) -> Array:
-        """Variance that the scatter adds, for normal quantiles, (P,): 0 where maneuvers agree."""
+    def in_normal_quantiles(self) -> ModelError:
+        """What the scatter says that a model lacks, where every interval is a normal one.
+
+        Part of the variance may have causes that are the same in all maneuvers: it grows by what
+        the tested part lacks.
+        """
         inflated = self.factor > 1.0
         freedom = np.where(inflated, np.maximum(self.maneuvers - 1.0, 1.0), np.inf)
         quantile_ratio = special.stdtrit(freedom, 0.975) / special.ndtri(0.975)
-        return np.where(inflated, ((self.factor * quantile_ratio) ** 2 - 1.0) * self.variance, 0.0)
+        more = ((self.factor * quantile_ratio) ** 2 - 1.0) * self.variance
+        return ModelError(variance=np.where(inflated, more, 0.0))
 
 
 def maneuver_influence(
@@ -139,16 +145,16 @@ def scatter_test(
     )
 
 
-def inflate_covariance(known: Uncertainty, found: ManeuverAgreement | None) -> Uncertainty:
-    """Return the covariance inflated by Birge ratios, with a warning for each."""
+def disagreement(found: ManeuverAgreement | None) -> ModelError | None:
+    """Return what the scatter says that a model lacks, and a line for each parameter."""
     if found is None or not np.any(found.factor > 1.0):
-        return known
-    inflated = np.flatnonzero(found.factor > 1.0)
+        return None
+    inflated = found.factor > 1.0
     warnings = (
         f"maneuvers do not agree on {found.names[k]}: they scatter {found.factor[k]:.1f} times its"
         f" interval (chi-square {found.chi_square[k]:.1f} on {found.maneuvers[k] - 1.0:.1f}),"
         " widened to it"
-        for k in inflated
+        for k in np.flatnonzero(inflated)
     )
-    freedom = found.maneuvers[inflated] - 1.0
-    return known.times(found.factor).of_a_sample(inflated, freedom, *warnings)
+    freedom = np.where(inflated, found.maneuvers - 1.0, np.inf)
+    return ModelError(factor=found.factor, freedom=freedom, warnings=tuple(warnings))
