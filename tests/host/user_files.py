@@ -143,7 +143,7 @@ def use_aircraft(path: Path, rng: random.Random) -> None:
     from host.aircraft.powerplant import powerplant
     from host.aircraft.trim import solve
     from host.instrument.deviations import sensor_error_model
-    from host.sysid.conversion.conversion_table import FlightCondition, conversion_document, convert
+    from host.sysid.conversion import FlightCondition, conversion_document, convert
 
     plane = None
     with contextlib.suppress(HostError):
@@ -194,7 +194,7 @@ def use_model(path: Path, rng: random.Random) -> None:
     """As `identify --model` and `simulate --aircraft` do."""
     from host.planning.identified_aircraft import is_model
     from host.sysid.coefficients import CoefficientModel
-    from host.sysid.conversion.conversion_table import FlightCondition, convert
+    from host.sysid.conversion import FlightCondition, convert
     from host.sysid.models import read_model
     from host.sysid.models.model_file import read_trim
 
@@ -215,7 +215,7 @@ def use_model(path: Path, rng: random.Random) -> None:
 def use_prior(path: Path, rng: random.Random) -> None:
     """As `identify --prior` and `convert` do."""
     from host.aircraft.prior.prior_file import read_prior
-    from host.sysid.conversion.conversion_table import FlightCondition, conversion_document, convert
+    from host.sysid.conversion import FlightCondition, conversion_document, convert
 
     del rng
     with contextlib.suppress(HostError):

@@ -18,7 +18,7 @@ from host.constants import NORMAL_95
 from host.errors import UsageError
 from host.files.user_text import read_text
 from host.planning.prior_range import LARGEST, random_aircraft
-from host.sysid.conversion.conversion_table import saved_values
+from host.sysid.conversion import saved_values
 from host.sysid.models import LinearModel, read_model
 from host.sysid.models.model_file import read_trim
 

@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     from host.aircraft.origin import announce_aircraft
     from host.errors import ExitCode, UsageError
     from host.sysid.answer import json_text
-    from host.sysid.conversion.conversion_table import (
+    from host.sysid.conversion import (
         FlightCondition,
         conversion_document,
         conversion_lines,

@@ -14,7 +14,7 @@ from host.sysid.answer.figure_kinds import Bar, interval_bars, save
 from host.sysid.coefficients import CoefficientAnswer
 from host.sysid.coefficients.coefficient_estimator import merged_windows
 from host.sysid.coefficients.coefficient_modes import coefficient_modes, quantities
-from host.sysid.conversion.derivative_conversion import ConversionPoint, to_derivatives
+from host.sysid.conversion import ConversionPoint, to_derivatives
 from host.sysid.flight import read_columns
 from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.pipeline import Identification, identify
