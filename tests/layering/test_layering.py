@@ -57,7 +57,7 @@ HOST_FLOORS: dict[str, tuple[str, ...]] = {
     "host": (
         *("files", "wire", "physical", "export", "original", "link", "log", "readers", "decode"),
         *("aircraft", "instrument", "bench_calibration", "twin", "sysid", "thesis"),
-        *("planning", "installation", "live", "preflight", "report", "fleet", "verbs"),
+        *("planning", "control", "installation", "live", "preflight", "report", "fleet", "verbs"),
     ),
     "host.fleet": ("statistics", "sources", "tasks", "dataset", "pages", "runs"),
     "host.twin": ("faults", "testcard", "flight", "sensors", "ground", "recorder", "outcome"),

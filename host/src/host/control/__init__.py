@@ -1,0 +1,22 @@
+"""From an answer to gains with margins: knows answers and aircraft, no estimator."""
+
+from host.faces import lazily
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from host.control.control_error import ControlError
+    from host.control.parameter_file import read_parameters
+    from host.control.tuning import AUTOPILOTS, Tuning, tune
+
+__all__ = ["AUTOPILOTS", "ControlError", "Tuning", "read_parameters", "tune"]
+
+__getattr__ = lazily(
+    __name__,
+    {
+        "AUTOPILOTS": "tuning",
+        "ControlError": "control_error",
+        "Tuning": "tuning",
+        "read_parameters": "parameter_file",
+        "tune": "tuning",
+    },
+)

@@ -1,0 +1,1 @@
+"""The structures that named autopilots fly, each in a file of its own, with its parameters."""

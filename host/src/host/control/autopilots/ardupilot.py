@@ -1,0 +1,155 @@
+"""ArduPlane 4.1 and later: attitude error to rate demand to surface, one axis.
+
+Law: APM_Control/AP_FW_Controller.cpp, AC_PID/AC_PID.cpp (4.7-dev 2598e9d). Its output in degrees is
+a share of 45, whatever angle the surface has there.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from host.arrays import Array
+from host.control.autopilots.structure import Setting
+
+FULL_RAD = math.pi / 4.0  # of the controllers' output: 45 notional degrees
+
+
+@cache
+def _document() -> dict[str, Any]:
+    return tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+
+
+def settings(axis: str) -> dict[str, Setting]:
+    """Return the tuned parameters of an axis by their role."""
+    return {role: Setting(*listed) for role, listed in _document()[axis].items()}
+
+
+def speed_scaler(airspeed_mps: float, fixed: Mapping[str, float]) -> float:
+    """Return SCALING_SPEED over the airspeed within its limits (ArduPlane/Attitude.cpp)."""
+    reference = fixed["scaling_speed_mps"]
+    lowest = min(0.5, reference / (2.0 * fixed["airspeed_max_mps"]))
+    highest = max(2.0, reference / (0.7 * fixed["airspeed_min_mps"]))
+    return float(np.clip(reference / airspeed_mps, lowest, highest))
+
+
+@dataclass(frozen=True, slots=True)
+class ArduPlaneLoop:
+    """One axis with gains at an airspeed; states are T, E, its derivative and the integral."""
+
+    gains: Mapping[str, float]
+    scaler: float
+    fixed: Mapping[str, float]
+    tas_ratio: float = 1.0
+    states: int = field(default=4, init=False)
+
+    @property
+    def period_s(self) -> float:
+        """Of the main loop."""
+        return 1.0 / self.fixed["loop_hz"]
+
+    def step(self, state: Array, angle_error: Array, rate: Array) -> tuple[Array, Array]:
+        """Return the new state and the output as a share of full travel."""
+        g, s, dt = self.gains, self.scaler, self.period_s
+        demand = angle_error / g["TC"]
+        target = state[..., 0] + self._share("FLTT_hz") * (s * s * demand - state[..., 0])
+        error = state[..., 1] + self._share("FLTE_hz") * (target - s * s * rate - state[..., 1])
+        slope = (error - state[..., 1]) / dt
+        derivative = state[..., 2] + self._share("FLTD_hz") * (slope - state[..., 2])
+        integral = state[..., 3] + g["I"] * error * dt
+        out = (
+            g["FF"] * target / (s * self.tas_ratio)
+            + g["P"] * error
+            + g["D"] * derivative
+            + integral
+        )
+        return np.stack([target, error, derivative, integral], axis=-1), out / FULL_RAD
+
+    def _share(self, name: str) -> float:
+        """Return what a first-order filter takes of a new value; a corner of 0 is no filter."""
+        corner_hz, dt = self.fixed[name], self.period_s
+        return dt / (dt + 1.0 / (2.0 * math.pi * corner_hz)) if corner_hz > 0.0 else 1.0
+
+
+@dataclass(frozen=True)
+class ArduPlane:
+    """One axis of ArduPlane: its parameters, and those of the log that stay.
+
+    Attributes
+    ----------
+    axis : str
+    fixed : mapping
+        Filters, loop rate and speeds; the log's own where it has them.
+    trim_mps : float
+        Airspeed of the model.
+    """
+
+    axis: str
+    fixed: Mapping[str, float]
+    trim_mps: float
+    searched: ClassVar[tuple[str, ...]] = ("P", "D", "TC")
+
+    def completed(self, chosen: Mapping[str, float], feed_forward: float) -> dict[str, float]:
+        """Return every gain: FF undoes the aircraft at its trim, I is as AUTOTUNE sets it.
+
+        AP_AutoTune.cpp: roll min(P, FF / 1 s), pitch max(0.75 P, FF / 1 s).
+        """
+        known = self.settings
+        # FF T / s with T = s^2 w: the scaler stands once in it.
+        factor = FULL_RAD / speed_scaler(self.trim_mps, self.fixed)
+        ff = known["FF"].rounded(feed_forward * factor)
+        p = chosen["P"]
+        i = min(p, ff) if self.axis == "roll" else max(0.75 * p, ff)
+        return {**chosen, "FF": ff, "I": known["I"].rounded(i)}
+
+    @property
+    def settings(self) -> Mapping[str, Setting]:
+        """Parameters that are tuned."""
+        return settings(self.axis)
+
+    @property
+    def gyro_filter_hz(self) -> float:
+        """INS_GYRO_FILTER."""
+        return self.fixed["gyro_filter_hz"]
+
+    def loop(self, gains: Mapping[str, float], airspeed_mps: float) -> ArduPlaneLoop:
+        """Return the axis with gains at an airspeed."""
+        return ArduPlaneLoop(dict(gains), speed_scaler(airspeed_mps, self.fixed), self.fixed)
+
+
+# What a log says of the parameters that stay, by their names in it.
+LOGGED = {
+    "FLTT_hz": "{}_RATE_FLTT",
+    "FLTE_hz": "{}_RATE_FLTE",
+    "FLTD_hz": "{}_RATE_FLTD",
+    "gyro_filter_hz": "INS_GYRO_FILTER",
+    "loop_hz": "SCHED_LOOP_RATE",
+    "scaling_speed_mps": "SCALING_SPEED",
+    "airspeed_min_mps": "AIRSPEED_MIN",
+    "airspeed_max_mps": "AIRSPEED_MAX",
+}
+PREFIX = {"roll": "RLL", "pitch": "PTCH"}
+
+
+def structure(axis: str, logged: Mapping[str, float], trim_mps: float) -> ArduPlane:
+    """Return an axis with the parameters of a log, defaults where it has none.
+
+    Parameters
+    ----------
+    axis : str
+        ``roll`` or ``pitch``.
+    logged : mapping of str to float
+        Parameters of the log by name.
+    trim_mps : float
+        Airspeed of the model.
+    """
+    names = {key: name.format(PREFIX[axis]) for key, name in LOGGED.items()}
+    known = {key: logged[name] for key, name in names.items() if name in logged}
+    return ArduPlane(axis, {**_document()["fixed"], **known}, trim_mps)

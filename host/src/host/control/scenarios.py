@@ -1,0 +1,195 @@
+"""Aircraft drawn from what is not known, each at each airspeed, as sampled plants."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from host.arrays import Array
+from host.control.actuator import Actuator
+from host.control.autopilots.structure import Loop, Structure, state_space
+from host.control.disturbances import gust_inputs
+from host.control.margins import Margins, Spectra, margins
+from host.control.plant import Plant, continuous, sampled
+from host.control.uncertain_axis import UncertainAxis
+
+POINTS = 160  # frequencies; 40 000 move a margin by less than 0.01 dB and 0.05 degrees
+SLOWEST_RADPS = 0.05  # one turn in two minutes
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What gains are looked for, and what is known of it.
+
+    Attributes
+    ----------
+    axis : UncertainAxis
+    actuator : Actuator
+    structure : Structure
+        Of the autopilot: its rate and gyro filter are in the loop.
+    airspeeds_mps : tuple of float
+    span_m : float
+        0 where nobody measured it: then no gust rolls the aircraft.
+    gyro_noise_radps : float
+    """
+
+    axis: UncertainAxis
+    actuator: Actuator
+    structure: Structure
+    airspeeds_mps: tuple[float, ...]
+    span_m: float = 0.0
+    gyro_noise_radps: float = 0.0
+
+    @property
+    def period_s(self) -> float:
+        """Of the autopilot's loop."""
+        usual = {role: one.default for role, one in self.structure.settings.items()}
+        return self.structure.loop(usual, self.airspeeds_mps[0]).period_s
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One aircraft at one airspeed.
+
+    Attributes
+    ----------
+    plant : Plant
+    response : Array, shape (F, 2)
+        Angle and rate per share of travel.
+    gusts : tuple of (Array, Array)
+        Angle and rate per gust, shape (F, 2), and its spectrum.
+    surface : Array, shape (F,)
+        Rate of the surface (rad/s) per share of travel demanded.
+    """
+
+    plant: Plant
+    response: Spectra
+    gusts: tuple[tuple[Spectra, Array], ...]
+    surface: Spectra
+
+
+@dataclass(frozen=True)
+class Scenarios:
+    """Aircraft of one drawing, speed by speed."""
+
+    problem: Problem
+    frequency_radps: Array
+    of_speed: tuple[tuple[Scenario, ...], ...]
+
+    def loops(self, gains: Mapping[str, float]) -> tuple[Spectra, Spectra]:
+        """Return the loop broken at the actuator and the attitude loop, each (speeds * N, F)."""
+        by_angle, by_rate = self._laws(gains)
+        # Measured values enter with a minus: L is what comes back, turned.
+        angle = -by_angle[:, None] * self.responses[..., 0]
+        rate = -by_rate[:, None] * self.responses[..., 1]
+        shape = (-1, len(self.frequency_radps))
+        return (angle + rate).reshape(shape), (angle / (1.0 + rate)).reshape(shape)
+
+    def _laws(self, gains: Mapping[str, float]) -> tuple[Spectra, Spectra]:
+        """Return the loop's output per angle and per rate at each airspeed, (speeds, F) each."""
+        structure, speeds = self.problem.structure, self.problem.airspeeds_mps
+        found = [law_response(structure.loop(gains, v), self.frequency_radps) for v in speeds]
+        return np.array([one for one, _ in found]), np.array([one for _, one in found])
+
+    @cached_property
+    def responses(self) -> Spectra:
+        """Angle and rate per share of travel, shape (speeds, N, F, 2)."""
+        return np.array([[one.response for one in row] for row in self.of_speed])
+
+    def judged(self, gains: Mapping[str, float]) -> tuple[Margins, Margins]:
+        """Return the margins at the actuator and of the attitude loop."""
+        inner, outer = self.loops(gains)
+        return margins(inner, self.frequency_radps), margins(outer, self.frequency_radps)
+
+    def stable(self, gains: Mapping[str, float]) -> Array:
+        """Return whether each closed loop is stable, shape (speeds * N,)."""
+        found = []
+        for airspeed, row in zip(self.problem.airspeeds_mps, self.of_speed, strict=True):
+            law = state_space(self.problem.structure.loop(gains, airspeed))
+            found += [spectral_radius(closed(one.plant, law)) < 1.0 for one in row]
+        return np.array(found)
+
+    def surface_rate_radps(self, gains: Mapping[str, float]) -> Array:
+        """Return the rms rate of the surface in gusts of 1 m/s with the gyro's noise."""
+        w, period = self.frequency_radps, self.problem.period_s
+        inner, _ = self.loops(gains)
+        by_angle, by_rate = self._laws(gains)
+        surface = np.array([[one.surface for one in row] for row in self.of_speed])
+        closes = surface / (1.0 + inner.reshape(surface.shape))
+        white = self.problem.gyro_noise_radps**2 * period / np.pi
+        power = np.abs(by_rate[:, None]) ** 2 * white
+        for k in range(len(self.of_speed[0][0].gusts)):
+            moved = np.array([[one.gusts[k][0] for one in row] for row in self.of_speed])
+            spectrum = np.array([row[0].gusts[k][1] for row in self.of_speed])
+            seen = by_angle[:, None] * moved[..., 0] + by_rate[:, None] * moved[..., 1]
+            power = power + np.abs(seen) ** 2 * spectrum[:, None]
+        rms = np.sqrt(np.trapezoid(np.abs(closes) ** 2 * power, w, axis=-1))
+        return np.asarray(rms.ravel())
+
+
+def draw(problem: Problem, *, seed: int, count: int) -> Scenarios:
+    """Return aircraft drawn from the joint covariance of the answer and from the actuator's.
+
+    Parameters
+    ----------
+    problem : Problem
+    seed : int
+        Another seed is another set of aircraft.
+    count : int
+    """
+    rng = np.random.default_rng([seed, 48])
+    values, drives = problem.axis.drawn(rng, count), problem.actuator.drawn(rng, count)
+    period = problem.period_s
+    w = np.geomspace(SLOWEST_RADPS, 0.98 * np.pi / period, POINTS)
+    rows = tuple(
+        tuple(
+            _scenario(problem, one, drive, airspeed, w)
+            for one, drive in zip(values, drives, strict=True)
+        )
+        for airspeed in problem.airspeeds_mps
+    )
+    return Scenarios(problem, w, rows)
+
+
+def _scenario(
+    problem: Problem, values: Array, drive: Array, airspeed_mps: float, w: Array
+) -> Scenario:
+    travel_rad, bandwidth_hz, delay_s = drive.tolist()
+    axis, dynamics = problem.axis.axis, problem.axis.matrices(values, airspeed_mps)
+    system = continuous(axis, dynamics, travel_rad, bandwidth_hz, problem.structure.gyro_filter_hz)
+    plant = sampled(system, delay_s, problem.period_s)
+    a, _, c = system
+    left = 1j * w[:, None, None] * np.eye(len(a)) - a
+    gusts = []
+    found = gust_inputs(axis, dynamics[0], dynamics[2], airspeed_mps, problem.span_m, w)
+    for column, spectrum in found:
+        into = np.zeros((len(w), len(a), 1), dtype=complex)
+        into[:, : len(column)] = column
+        gusts.append(((c @ np.linalg.solve(left, into))[..., 0], spectrum))
+    lag = 2.0 * np.pi * bandwidth_hz
+    surface = travel_rad * 1j * w * lag / (1j * w + lag)
+    return Scenario(plant, plant.response(w), tuple(gusts), surface)
+
+
+def law_response(loop: Loop, frequency_radps: Array) -> tuple[Spectra, Spectra]:
+    """Return the loop's output per measured angle and per measured rate, each of shape (F,)."""
+    a, b, c, d = state_space(loop)
+    z = np.exp(1j * frequency_radps * loop.period_s)
+    left = z[:, None, None] * np.eye(len(a)) - a
+    column = np.broadcast_to(b.astype(complex), (len(z), *b.shape))
+    found = np.asarray(c @ np.linalg.solve(left, column) + d, dtype=np.complex128)
+    return found[:, 0, 0], found[:, 0, 1]
+
+
+def closed(plant: Plant, law: tuple[Array, Array, Array, Array]) -> Array:
+    """Return the transition of plant and loop together; the plant's output has no direct part."""
+    a, b, c, d = law
+    return np.block([[plant.a + plant.b @ d @ plant.c, plant.b @ c], [b @ plant.c, a]])
+
+
+def spectral_radius(matrix: Array) -> float:
+    """Return the largest size of an eigenvalue."""
+    return float(np.max(np.abs(np.linalg.eigvals(matrix))))

@@ -1,0 +1,219 @@
+"""From an answer to gains of a named autopilot: one call, and what it returns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from host.aircraft.file import load_measured
+from host.control.actuator import actuator_of
+from host.control.autopilots import ardupilot
+from host.control.control_error import ControlError
+from host.control.disturbances import gyro_noise_radps
+from host.control.loop_design import Design, design
+from host.control.parameter_file import Change, parameter_text, restoring_text
+from host.control.plant import RATES
+from host.control.scenarios import Problem
+from host.control.uncertain_axis import UncertainAxis, axes_of, axes_of_models
+
+if TYPE_CHECKING:
+    from host.sysid.pipeline import Identification
+
+AUTOPILOTS = {"ardupilot": ardupilot.structure}
+
+
+@dataclass(frozen=True)
+class AxisTuning:
+    """One axis: what was asked, what was found, what was before."""
+
+    problem: Problem
+    design: Design
+    before: Mapping[str, float]
+
+    @property
+    def axis(self) -> str:
+        """``roll`` or ``pitch``."""
+        return self.problem.axis.axis
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """Parameters whose value is another than before; none where no gains hold."""
+        settings = self.problem.structure.settings
+        found = []
+        for role, value in (self.design.gains or {}).items():
+            known = settings[role]
+            old = self.before.get(known.name)
+            if old is None or abs(old - value) > 0.5 * known.step:
+                found.append(Change(known.name, round(value, 6), old, known.unit))
+        return tuple(found)
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Gains for an autopilot with what was proven of them.
+
+    Attributes
+    ----------
+    autopilot, aircraft : str
+    axes : tuple of AxisTuning
+    notes : tuple of str
+        What was not known, and what was taken in its place.
+    """
+
+    autopilot: str
+    aircraft: str
+    axes: tuple[AxisTuning, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def gains(self) -> dict[str, float]:
+        """Every gain by the autopilot's own name; axes without gains have none."""
+        return {
+            one.problem.structure.settings[role].name: round(value, 6)
+            for one in self.axes
+            for role, value in (one.design.gains or {}).items()
+        }
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """Parameters that change."""
+        return tuple(change for one in self.axes for change in one.changes)
+
+    @property
+    def margins(self) -> dict[str, dict[str, float]]:
+        """Worst margins of each axis over the unseen aircraft."""
+        return {one.axis: dict(_worst(one)) for one in self.axes}
+
+    def to_param(self) -> str:
+        """Return the changed parameters as a file for Mission Planner."""
+        heading = [f"{self.aircraft}: gains of host tune; try half of them first"]
+        return parameter_text(self.changes, heading)
+
+    def to_restore(self) -> str:
+        """Return the file that takes them back."""
+        defaults = {
+            setting.name: setting.default
+            for one in self.axes
+            for setting in one.problem.structure.settings.values()
+        }
+        return restoring_text(self.changes, defaults)
+
+    def document(self) -> dict[str, Any]:
+        """Return everything as plain numbers and strings."""
+        return {
+            "autopilot": self.autopilot,
+            "aircraft": self.aircraft,
+            "gains": self.gains,
+            "changes": [
+                {"name": c.name, "new": c.new, "old": c.old, "unit": c.unit} for c in self.changes
+            ],
+            "margins": self.margins,
+            "refused": [one.axis for one in self.axes if one.design.gains is None],
+            "notes": list(self.notes),
+        }
+
+    def to_text(self) -> str:
+        """Return what people read."""
+        from host.control.tuning_text import tuning_lines
+
+        return "\n".join(tuning_lines(self))
+
+    def __str__(self) -> str:
+        """Return the text that `host tune` prints."""
+        return self.to_text()
+
+
+def tune(
+    source: Identification | Sequence[str | Path],
+    *,
+    aircraft: str,
+    autopilot: str = "ardupilot",
+    parameters: Mapping[str, float] | None = None,
+    airspeeds_mps: Sequence[float] = (),
+    seed: int = 0,
+) -> Tuning:
+    """Return the fastest gains that keep 6 dB and 45 degrees over all that the data leave open.
+
+    Parameters
+    ----------
+    source : Identification or sequence of path
+        An answer, or models of `host identify --save-model`.
+    aircraft : str
+        Name or file: travel of the surfaces, servo, span, speed range.
+    autopilot : str
+        ``ardupilot``.
+    parameters : mapping of str to float, optional
+        Of the autopilot, as a log or a parameter file has them; its defaults without.
+    airspeeds_mps : sequence of float
+        Speeds that the gains hold at; least, trim and largest of the aircraft file without.
+    seed : int
+        Of the aircraft drawn.
+
+    Raises
+    ------
+    ControlError
+        Nothing can be tuned: no model of an axis, no travel, an unknown autopilot.
+    host.errors.HostError
+        A file cannot be read.
+    """
+    if autopilot not in AUTOPILOTS:
+        raise ControlError(f"autopilot '{autopilot}', expected {', '.join(AUTOPILOTS)}")
+    structure_of = AUTOPILOTS[autopilot]
+    if isinstance(source, Sequence):
+        axes, noise = axes_of_models([Path(one) for one in source]), dict[str, float]()
+    else:
+        axes = axes_of(source)
+        noise = {name: _noise(source, name) for name in axes}
+    loaded = load_measured(aircraft)
+    logged = dict(parameters or {})
+    notes = list(_notes(axes, known=bool(logged)))
+    found = []
+    for name, axis in axes.items():
+        speeds = tuple(airspeeds_mps) or _speeds(loaded.scalars, axis)
+        problem = Problem(
+            axis,
+            actuator_of(aircraft, name),
+            structure_of(name, logged, axis.trim.airspeed_mps),
+            speeds,
+            loaded.scalars.get("geometry.span_m", 0.0),
+            noise.get(name, 0.0),
+        )
+        found.append(AxisTuning(problem, design(problem, seed=seed), logged))
+    return Tuning(autopilot, loaded.title, tuple(found), tuple(notes))
+
+
+def _speeds(scalars: Mapping[str, float], axis: UncertainAxis) -> tuple[float, ...]:
+    least = scalars.get("trim.minimum_airspeed_mps", 0.0)
+    largest = scalars.get("trim.maximum_airspeed_mps", 0.0)
+    trim = axis.trim.airspeed_mps
+    return tuple(sorted({v for v in (least, trim, largest) if v > 0.0}))
+
+
+def _noise(identified: Identification, axis: str) -> float:
+    columns = [flight.recorded.get(RATES[axis]) for flight in identified.flights]
+    return gyro_noise_radps([one for one in columns if one is not None])
+
+
+def _notes(axes: Mapping[str, UncertainAxis], *, known: bool) -> Iterator[str]:
+    for missing in [name for name in ("roll", "pitch") if name not in axes]:
+        yield f"no gains for {missing}: the answer has no model of it"
+    if any(not one.correlated for one in axes.values()):
+        yield "a saved model has no correlations: its derivatives are drawn independently"
+    if not known:
+        yield (
+            "filters, loop rate and speeds are the autopilot's defaults: name its parameters with"
+            " --parameters, or a log that has them"
+        )
+
+
+def _worst(one: AxisTuning) -> Iterator[tuple[str, float]]:
+    found = one.design.verification
+    for name, loop in (("actuator", found.actuator), ("attitude", found.attitude)):
+        yield f"{name}_gain_db", float(loop.gain_db.min())
+        yield f"{name}_phase_deg", float(loop.phase_deg.min())
+        yield f"{name}_disk", float(loop.disk.min())
+    yield "crossover_least_radps", found.crossover_radps[0]
+    yield "crossover_median_radps", found.crossover_radps[1]
+    yield "surface_rate_radps", found.surface_rate_radps

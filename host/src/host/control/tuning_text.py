@@ -1,0 +1,79 @@
+"""What `host tune` prints: gains, margins, why, and how to fly them first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from host.control.verification import UNSEEN
+
+if TYPE_CHECKING:
+    from host.control.tuning import AxisTuning, Tuning
+
+FIRST_FLIGHT = (
+    "First flight",
+    "  1. Load half of each P, I and D; FF and time constants whole. Keep the other file at hand.",
+    "  2. Check on the ground in FBWA: nose up by hand, the elevator goes down; right wing down,"
+    " the right aileron goes down.",
+    "  3. Take off in MANUAL. Switch to FBWA at a safe height, level, at trim speed.",
+    "  4. Look for a surface that buzzes or an aircraft that rocks: back to MANUAL, land, halve"
+    " again.",
+    "  5. Load the whole gains when this flew well. Fly banks of 30 degrees at both ends of the"
+    " speed range.",
+)
+
+
+def tuning_lines(found: Tuning) -> Iterator[str]:
+    """Return the answer line by line."""
+    yield f"{found.aircraft}, gains for {found.autopilot}"
+    yield from (f"  note: {one}" for one in found.notes)
+    for axis in found.axes:
+        yield ""
+        yield from _axis_lines(axis)
+    if found.changes:
+        yield ""
+        yield from FIRST_FLIGHT
+
+
+def _axis_lines(one: AxisTuning) -> Iterator[str]:
+    problem, proven = one.problem, one.design.verification
+    speeds = ", ".join(f"{v:.1f}" for v in problem.airspeeds_mps)
+    if one.design.gains is None:
+        yield f"{one.axis}: no gains"
+        yield (
+            f"  the softest gains of the documented range leave {proven.worst_gain_db:.1f} dB and"
+            f" {proven.worst_phase_deg:.0f} deg in the worst of {UNSEEN} aircraft; 6 dB and 45 deg"
+            " are asked"
+        )
+        yield f"  widest: {_widest(one)}; fly more of it"
+        return
+    yield f"{one.axis}: at {speeds} m/s"
+    changed = {change.name: change for change in one.changes}
+    for role, value in one.design.gains.items():
+        setting = problem.structure.settings[role]
+        change = changed.get(setting.name)
+        old = "as before" if change is None else (
+            "before: not known" if change.old is None else f"before: {change.old:g}")  # fmt: skip
+        yield f"  {setting.name:18s} {value:8.4g} {setting.unit:13s} {old}"
+    for name, loop in (("at the surface", proven.actuator), ("attitude", proven.attitude)):
+        yield (
+            f"  {name + ' loop:':22s} at least {loop.gain_db.min():.1f} dB,"
+            f" {loop.phase_deg.min():.0f} deg, disk {loop.disk.min():.2f}"
+        )
+    low, middle, _ = proven.crossover_radps
+    yield f"  crossover {middle:.1f} rad/s, slowest aircraft {low:.1f}"
+    yield f"  surface in gusts of 1 m/s: {proven.surface_rate_radps:.2f} rad/s rms at most"
+    yield (
+        f"  {UNSEEN} unseen aircraft hold: 95 % of all do, with 99.9 % confidence"
+        f" ({one.design.rounds} design{'s' * (one.design.rounds > 1)})"
+    )
+
+
+def _widest(one: AxisTuning) -> str:
+    """Return the derivatives with the widest shares of their row's main ones."""
+    axis = one.problem.axis
+    moments = [n for n in axis.names if n[0] in "LM" and n.split("_")[1] in ("p", "q", "da", "de",
+               "alpha")]  # fmt: skip
+    value = dict(zip(axis.names, axis.mean.tolist(), strict=True))
+    shares = sorted(((axis.half_width(n) / abs(value[n]), n) for n in moments), reverse=True)
+    return ", ".join(f"{n} +- {100 * share:.0f} %" for share, n in shares[:2])

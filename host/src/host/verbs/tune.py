@@ -1,0 +1,75 @@
+"""`host tune`: gains for an autopilot from a log or saved models."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser(
+        "tune",
+        help="gains for an autopilot, with margins over all that the data leave open",
+        description="Identify a log, or read saved models, and find the fastest gains of roll and"
+        " pitch that keep 6 dB and 45 degrees in 135 aircraft drawn from the answer.",
+    )
+    parser.add_argument("source", nargs="+", metavar="SOURCE",
+                        help="log, or models of `host identify --save-model`")  # fmt: skip
+    parser.add_argument("--aircraft", required=True, metavar="NAME",
+                        help="aircraft file: travel of surfaces, servo, span, speeds")  # fmt: skip
+    parser.add_argument("--for", dest="autopilot", default="ardupilot", metavar="NAME",
+                        help="autopilot: ardupilot")  # fmt: skip
+    parser.add_argument("--parameters", type=Path, metavar="FILE",
+                        help="the autopilot's parameters as the ground station saves them; a log"
+                        " of it has its own")  # fmt: skip
+    parser.add_argument("--airspeed", type=float, action="append", default=[], metavar="MPS",
+                        help="airspeed that the gains hold at; repeatable (default: least, trim"
+                        " and largest of the aircraft file)")  # fmt: skip
+    parser.add_argument("--save", type=Path, metavar="FILE",
+                        help="write changed parameters as FILE, the old ones beside it as"
+                        " FILE-before")  # fmt: skip
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Tune and print."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from host.aircraft.origin import announce_aircraft
+    from host.control import ControlError, read_parameters, tune
+    from host.errors import ExitCode
+    from host.export.atomic_files import atomic_write
+    from host.planning.identified_aircraft import is_model
+    from host.readers.autopilot_flight import is_autopilot_log, read_autopilot
+    from host.sysid.pipeline import identify
+
+    announce_aircraft([args.aircraft])
+    logged = read_parameters(args.parameters) if args.parameters else {}
+    models = [one for one in args.source if is_model(one)]
+    if models and len(models) < len(args.source):
+        raise ControlError("SOURCE names models and logs, expected one kind")
+    source: Any = models
+    if not models:
+        first = Path(args.source[0])
+        if not logged and is_autopilot_log(first):
+            logged = dict(read_autopilot(first).log.parameters)
+        source = identify(args.source, aircraft=args.aircraft)
+    found = tune(
+        source,
+        aircraft=args.aircraft,
+        autopilot=args.autopilot,
+        parameters=logged,
+        airspeeds_mps=args.airspeed,
+    )
+    print(json.dumps(found.document(), indent=2) if args.json else found.to_text())
+    if args.save is not None:
+        before = args.save.with_name(f"{args.save.stem}-before{args.save.suffix}")
+        for place, text in ((args.save, found.to_param()), (before, found.to_restore())):
+            with atomic_write(place) as unfinished:
+                unfinished.write_text(text, encoding="utf-8")
+        print(f"wrote {args.save}, {before}", file=sys.stderr)
+    return int(ExitCode.OK)

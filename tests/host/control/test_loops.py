@@ -1,0 +1,89 @@
+"""Plants, laws and margins against closed forms and python-control."""
+
+from __future__ import annotations
+
+import math
+
+import control
+import numpy as np
+import pytest
+from host.arrays import Array
+from host.control.autopilots import ardupilot
+from host.control.autopilots.structure import state_space
+from host.control.margins import FAR_DB, margins
+from host.control.plant import continuous, sampled
+
+
+def test_margins_of_a_loop_that_is_worked_by_hand() -> None:
+    # L = k / (s (s + 1) (s + 2)): phase -180 degrees at sqrt(2), where |L| = k / 6.
+    w = np.geomspace(0.01, 100.0, 4000)
+    s = 1j * w
+    found = margins(np.array([k / (s * (s + 1) * (s + 2)) for k in (1.5, 3.0)]), w)
+    assert found.gain_db == pytest.approx([20 * math.log10(4.0), 20 * math.log10(2.0)], abs=0.01)
+    at = found.crossover_radps
+    own = 90.0 - np.rad2deg(np.arctan(at) + np.arctan(at / 2.0))
+    assert found.phase_deg == pytest.approx(own, abs=0.01)
+    assert at * np.hypot(at, 1.0) * np.hypot(at, 2.0) == pytest.approx([1.5, 3.0], rel=1e-3)
+
+
+def test_a_gain_that_must_not_fall_counts_as_a_gain_margin() -> None:
+    # L = 2 (s + 1)^2 / s^3: phase -180 degrees at 1 rad/s, where |L| = 4; less than 1 is unstable.
+    w = np.geomspace(1e-2, 100.0, 4000)
+    s = 1j * w
+    found = margins((2.0 * (s + 1) ** 2 / s**3)[None], w)
+    assert found.gain_db[0] == pytest.approx(20 * math.log10(4.0), abs=0.01)
+
+
+def test_a_loop_that_never_comes_near_has_no_margin_to_print() -> None:
+    w = np.geomspace(0.01, 100.0, 400)
+    assert margins(0.1 / (1j * w + 1.0)[None], w).gain_db[0] == FAR_DB
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.004, 0.02, 0.033])
+def test_a_sampled_plant_is_that_of_its_own_hold_and_delay(delay_s: float) -> None:
+    a, b = np.array([[-20.0]]), np.array([[300.0]])
+    system = continuous("roll", (a, b, ("p_radps",)), 0.4, 8.0, 20.0)
+    plant = sampled(system, delay_s, 0.02)
+    # Fine steps of an eighth of a millisecond, whose delay is whole: an integration of its own.
+    fine = control.c2d(control.ss(*system, np.zeros((2, 1))), 1.25e-4)
+    rng = np.random.default_rng(5)
+    out = rng.standard_normal(40)
+    held = np.repeat(out, 160)
+    late = round(delay_s / 1.25e-4)
+    driven = np.concatenate([np.zeros(late), held])[: len(held)]
+    seen = control.forced_response(fine, inputs=driven).outputs[:, ::160]
+    state, own = np.zeros(len(plant.a)), []
+    for u in out:
+        own.append(plant.c @ state)
+        state = plant.a @ state + plant.b[:, 0] * u
+    np.testing.assert_allclose(np.array(own).T, seen, atol=1e-8)
+
+
+def test_arduplane_holds_a_rate_by_feed_forward_alone() -> None:
+    fixed = {**ardupilot.structure("roll", {}, 15.0).fixed, "FLTT_hz": 0.0}
+    loop = ardupilot.ArduPlaneLoop({"P": 0.0, "I": 0.0, "D": 0.0, "FF": 0.2, "TC": 0.5}, 0.8, fixed)
+    _, out = loop.step(np.zeros(4), np.array(0.1), np.array(0.0))
+    # 0.2 rad/s asked: FF T / s with T = s^2 w gives 0.2 x 0.8 x 0.2 of pi / 4.
+    assert float(out) == pytest.approx(0.2 * 0.8 * 0.2 / (math.pi / 4.0))
+
+
+def test_the_law_that_is_analysed_is_the_one_that_flies() -> None:
+    gains = {"P": 0.15, "I": 0.2, "D": 0.004, "FF": 0.3, "TC": 0.45}
+    loop = ardupilot.structure("pitch", {"PTCH_RATE_FLTE": 5.0}, 15.0).loop(gains, 18.0)
+    a, b, c, d = state_space(loop)
+    rng = np.random.default_rng(2)
+    state: Array = np.zeros(4)
+    own: Array = np.zeros(4)
+    for _ in range(200):
+        angle, rate = rng.standard_normal(2)
+        state, flown = loop.step(state, np.array(-angle), np.array(rate))
+        linear = float((c @ own + d @ [angle, rate])[0])
+        own = a @ own + b @ [angle, rate]
+        assert linear == pytest.approx(float(flown), rel=1e-9, abs=1e-12)
+
+
+def test_the_speed_scaler_ends_where_arduplane_ends_it() -> None:
+    fixed = ardupilot.structure("roll", {}, 15.0).fixed
+    assert ardupilot.speed_scaler(1.0, fixed) == pytest.approx(2.381, abs=1e-3)
+    assert ardupilot.speed_scaler(80.0, fixed) == pytest.approx(0.341, abs=1e-3)
+    assert ardupilot.speed_scaler(15.0, fixed) == 1.0

@@ -1,0 +1,106 @@
+"""Gains from an uncertain axis whose truth is known, and the files that carry them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from host.control import ControlError, read_parameters
+from host.control.actuator import Actuator, actuator_of
+from host.control.autopilots import ardupilot
+from host.control.disturbances import gyro_noise_radps
+from host.control.loop_design import design, feed_forward
+from host.control.parameter_file import Change, parameter_text, restoring_text
+from host.control.scenarios import Problem, draw
+from host.control.uncertain_axis import UncertainAxis
+from host.sysid.models import Trim
+
+DRIVE = Actuator("aileron", 0.4, 0.03, 8.0, 0.1, 4.0, 0.01, 0.005)
+
+
+def rolling(share: float) -> UncertainAxis:
+    """Return a roll axis, 1/s and 1/s2, known to a share of each derivative."""
+    mean = np.array([-10.0, 150.0])
+    return UncertainAxis(
+        "roll",
+        "roll",
+        Trim(15.0, 0.1, 0.1),
+        ("L_p", "L_da"),
+        mean,
+        np.diag((share * mean / 1.96) ** 2),
+    )
+
+
+def problem(share: float, *speeds: float) -> Problem:
+    return Problem(
+        rolling(share), DRIVE, ardupilot.structure("roll", {}, 15.0), speeds or (15.0,), 1.3
+    )
+
+
+def test_feed_forward_is_roll_damping_over_aileron() -> None:
+    assert feed_forward(problem(0.1)) == pytest.approx(10.0 / 150.0 / 0.4)
+
+
+def test_derivatives_scale_with_the_airspeed() -> None:
+    a, b, states = rolling(0.0).matrices(np.array([-10.0, 150.0]), 30.0)
+    k = states.index("p_radps")
+    assert a[k, k] == pytest.approx(-20.0)
+    assert b[k, 0] == pytest.approx(600.0)
+
+
+def test_draws_have_the_covariance_that_was_given() -> None:
+    axis = rolling(0.2)
+    drawn = axis.drawn(np.random.default_rng(3), 20_000)
+    assert np.cov(drawn.T) == pytest.approx(axis.covariance, abs=0.03 * axis.covariance.max())
+
+
+@pytest.mark.costs(30, "two designs with their verifications, 270 aircraft")
+def test_less_knowledge_gives_softer_gains_and_both_keep_their_margins() -> None:
+    known, open_ = design(problem(0.02)), design(problem(0.5))
+    assert known.gains is not None
+    assert open_.gains is not None
+    for one in (known, open_):
+        assert one.verification.worst_gain_db >= 6.0
+        assert one.verification.worst_phase_deg >= 45.0
+        assert one.verification.stable
+    assert known.verification.crossover_radps[1] > open_.verification.crossover_radps[1]
+    # On aircraft of a third drawing, at their own poles.
+    assert draw(problem(0.02), seed=77, count=30).stable(known.gains).all()
+
+
+def test_an_axis_whose_sign_is_open_has_no_gains() -> None:
+    assert design(problem(3.0)).gains is None
+
+
+def test_noise_is_told_from_motion() -> None:
+    t = np.arange(0.0, 20.0, 0.01)
+    noise = 0.01 * np.random.default_rng(1).standard_normal(len(t))
+    assert gyro_noise_radps([np.sin(6.0 * t) + noise]) == pytest.approx(0.01, rel=0.05)
+
+
+def test_parameters_go_out_and_come_back(tmp_path: Path) -> None:
+    changes = [Change("RLL_RATE_P", 0.12, 0.08, "s"), Change("RLL_RATE_D", 0.004, None, "s")]
+    new, old = tmp_path / "new.param", tmp_path / "old.param"
+    new.write_text(parameter_text(changes, ["Trainer"]), encoding="utf-8")
+    old.write_text(restoring_text(changes, {"RLL_RATE_D": 0.0}), encoding="utf-8")
+    assert read_parameters(new) == {"RLL_RATE_P": 0.12, "RLL_RATE_D": 0.004}
+    assert read_parameters(old) == {"RLL_RATE_P": 0.08, "RLL_RATE_D": 0.0}
+
+
+def test_a_file_without_parameters_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "empty.param"
+    path.write_text("# nothing\nnan,nan\n", encoding="utf-8")
+    with pytest.raises(ControlError, match="no parameter"):
+        read_parameters(path)
+
+
+def test_degrees_without_travel_are_refused(tmp_path: Path) -> None:
+    from host.aircraft.file import FOLDER
+
+    text = (FOLDER / "ultrastick25e.toml").read_text(encoding="utf-8")
+    kept = text.replace("aileron_limit_rad = 0.4363323", "aileron_limit_rad = 0.0")
+    path = tmp_path / "mine.toml"
+    path.write_text(kept, encoding="utf-8")
+    with pytest.raises(Exception, match="aileron_limit_rad"):
+        actuator_of(str(path), "roll")
