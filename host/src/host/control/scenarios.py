@@ -107,23 +107,49 @@ class Scenarios:
     def stable(self, gains: Mapping[str, float]) -> Array:
         """Return whether each closed loop is stable, shape (speeds * N,)."""
         found = []
-        for airspeed, row in zip(self.problem.airspeeds_mps, self.of_speed, strict=True):
+        for airspeed, (a, b, c) in zip(self.problem.airspeeds_mps, self._plants, strict=True):
             law = state_space(self.problem.structure.loop(gains, airspeed))
-            found += [spectral_radius(closed(one.plant, law)) < 1.0 for one in row]
-        return np.array(found)
+            poles = np.linalg.eigvals(closed(a, b, c, law))
+            found.append(np.max(np.abs(poles), axis=-1) < 1.0)
+        return np.concatenate(found)
+
+    @cached_property
+    def _plants(self) -> list[tuple[Array, Array, Array]]:
+        """A, B, C of each airspeed's aircraft, stacked; those of shorter delay with idle states."""
+        size = max(len(one.plant.a) for row in self.of_speed for one in row)
+        return [
+            (
+                np.stack([_padded(one.plant.a, size, size) for one in row]),
+                np.stack([_padded(one.plant.b, size, 1) for one in row]),
+                np.stack([_padded(one.plant.c, 2, size) for one in row]),
+            )
+            for row in self.of_speed
+        ]
+
+    @cached_property
+    def _surfaces(self) -> Spectra:
+        return np.array([[one.surface for one in row] for row in self.of_speed])
+
+    @cached_property
+    def _gusts(self) -> list[tuple[Spectra, Array]]:
+        """Angle and rate per gust, shape (speeds, N, F, 2), and its spectra, shape (speeds, F)."""
+        return [
+            (
+                np.array([[one.gusts[k][0] for one in row] for row in self.of_speed]),
+                np.array([row[0].gusts[k][1] for row in self.of_speed]),
+            )
+            for k in range(len(self.of_speed[0][0].gusts))
+        ]
 
     def surface_rate_radps(self, gains: Mapping[str, float]) -> Array:
         """Return the rms rate of the surface in gusts of 1 m/s with the gyro's noise."""
         w, period = self.frequency_radps, self.problem.period_s
         inner, _ = self.loops(gains)
         by_angle, by_rate = self._laws(gains)
-        surface = np.array([[one.surface for one in row] for row in self.of_speed])
-        closes = surface / (1.0 + inner.reshape(surface.shape))
+        closes = self._surfaces / (1.0 + inner.reshape(self._surfaces.shape))
         white = self.problem.gyro_noise_radps**2 * period / np.pi
         power = np.abs(by_rate[:, None]) ** 2 * white
-        for k in range(len(self.of_speed[0][0].gusts)):
-            moved = np.array([[one.gusts[k][0] for one in row] for row in self.of_speed])
-            spectrum = np.array([row[0].gusts[k][1] for row in self.of_speed])
+        for moved, spectrum in self._gusts:
             seen = by_angle[:, None] * moved[..., 0] + by_rate[:, None] * moved[..., 1]
             power = power + np.abs(seen) ** 2 * spectrum[:, None]
         rms = np.sqrt(np.trapezoid(np.abs(closes) ** 2 * power, w, axis=-1))
@@ -184,12 +210,26 @@ def law_response(loop: Loop, frequency_radps: Array) -> tuple[Spectra, Spectra]:
     return found[:, 0, 0], found[:, 0, 1]
 
 
-def closed(plant: Plant, law: tuple[Array, Array, Array, Array]) -> Array:
-    """Return the transition of plant and loop together; the plant's output has no direct part."""
-    a, b, c, d = law
-    return np.block([[plant.a + plant.b @ d @ plant.c, plant.b @ c], [b @ plant.c, a]])
+def closed(a: Array, b: Array, c: Array, law: tuple[Array, Array, Array, Array]) -> Array:
+    """Return the transitions of plants and loop together; a plant's output has no direct part.
+
+    Parameters
+    ----------
+    a, b, c : Array, shapes (N, n, n), (N, n, 1), (N, 2, n)
+    law : tuple of Array
+        A, B, C, D of the loop.
+    """
+    la, lb, lc, ld = law
+    n, count = a.shape[-1], len(a)
+    full = np.zeros((count, n + len(la), n + len(la)))
+    full[:, :n, :n] = a + b @ ld @ c
+    full[:, :n, n:] = b @ lc
+    full[:, n:, :n] = lb @ c
+    full[:, n:, n:] = la
+    return full
 
 
-def spectral_radius(matrix: Array) -> float:
-    """Return the largest size of an eigenvalue."""
-    return float(np.max(np.abs(np.linalg.eigvals(matrix))))
+def _padded(matrix: Array, rows: int, columns: int) -> Array:
+    wide = np.zeros((rows, columns))
+    wide[: matrix.shape[0], : matrix.shape[1]] = matrix
+    return wide
