@@ -41,7 +41,7 @@ VERBS = {
     "export": "write a flight for other programs",
     "fleet": "say what a type of aircraft is, from all flights of its fleet",
     "predict": "run a saved model over another record",
-    "tune": "gains for an autopilot, with margins over all that the data leave open",
+    "tune": "find gains for an autopilot that keep their margins",
     "convert": "turn derivatives into coefficients, and back",
     "doctor": "say what is installed, plugged in, set and kept",
     "completion": "print the script that completes these words in your shell",

@@ -141,8 +141,9 @@ def axes_of_models(paths: Sequence[Path]) -> dict[str, UncertainAxis]:
     host.errors.HostError
         A file is no model.
     """
-    from host.sysid.conversion.conversion_table import saved_values
-    from host.sysid.models.model_file import read_model, read_trim
+    from host.sysid.conversion import saved_values
+    from host.sysid.models import read_model
+    from host.sysid.models.model_file import read_trim
 
     found: dict[str, UncertainAxis] = {}
     for path in paths:

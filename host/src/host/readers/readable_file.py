@@ -5,8 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from host.errors import NotALogError
+from host.original.rows import looks_like_rows
 from host.readers.gzip_file import expanded, is_gzip
 from host.terminal import command_line
+from host.wire.blocks import MAGIC
+from host.wire.stream import looks_like_stream
 
 HEAD_BYTES = 4096
 BLACKBOX = (
@@ -65,9 +68,13 @@ def refuse_table(source: Path) -> None:
     Raises
     ------
     NotALogError
-        If the file has the ending of a table.
+        If the file has the ending of a table, and does not begin as a log does.
     """
-    if source.suffix.lower() in TABLES:
+    if source.suffix.lower() in TABLES and source.is_file():
+        with source.open("rb") as file:
+            head = file.read(HEAD_BYTES)
+        if MAGIC in head or looks_like_stream(head) or looks_like_rows(head):
+            return
         look = command_line("host", "maneuvers", source)
         raise NotALogError(
             f"{source}: a table, not a log; `{look}` reads it, with --map where its names are"

@@ -14,7 +14,7 @@ def add_parser(subparsers: Any) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser(
         "tune",
-        help="gains for an autopilot, with margins over all that the data leave open",
+        help="find gains for an autopilot that keep their margins",
         description="Identify a log, or read saved models, and find the fastest gains of roll and"
         " pitch that keep 6 dB and 45 degrees in 135 aircraft drawn from the answer.",
     )
