@@ -53,7 +53,7 @@ def test_an_empty_folder_is_no_log(tmp_path: Path, capsys: pytest.CaptureFixture
     [
         ("00000012.BIN", b"\xa3\x95\x80" + bytes(600), "DataFlash log but holds no whole record"),
         ("log.ulg", b"ULog\x01\x12\x35" + bytes(600), "ULog but holds no message"),
-        ("table.xlsx", b"PK\x03\x04" + bytes(600), "save it as CSV"),
+        ("table.xlsx", b"PK\x03\x04" + bytes(600), "libreoffice --headless"),
         ("flight.bin", b"", "not one intact block"),
         ("flight.bin", b"\0" * 600, "not one intact block"),
         ("flight.csv", b"", "the file is empty"),

@@ -305,7 +305,8 @@ def test_pictures_are_shown_and_saved(one: Identification, tmp_path: Path) -> No
     assert isinstance(pictures, Pictures)
     assert "longitudinal_fit" in pictures
     assert "coefficients_intervals" in pictures
-    assert len(pictures) == 12
+    assert {"longitudinal_bode", "lateral_bode"} <= set(pictures)
+    assert len(pictures) == 14
     two = Pictures({name: pictures[name] for name in ("lateral_fit", "coefficients_intervals")})
     page = two._repr_html_()
     assert page.count("<img ") == page.count("data:image/svg+xml;base64,") == len(two)
@@ -341,7 +342,7 @@ def test_a_hostile_model_writes_into_its_folder_only(
     written = Pictures({name: Figure() for name in found.plot()}).save(folder)
     assert found.table.index.get_level_values("model").nunique() == len(names)
     assert {p.resolve().parent for p in written} == {folder}
-    assert len({p.name.lower() for p in written}) == len(written) == 4 * len(names)
+    assert len({p.name.lower() for p in written}) == len(written) == 5 * len(names)
     written = found.save(OutputPaths(save_model=saved))
     assert {p.resolve().parent for p in written} == {saved.parent}
     assert len({p.name.lower() for p in written}) == len(names)
