@@ -42,7 +42,7 @@ def test_a_loop_that_never_comes_near_has_no_margin_to_print() -> None:
 @pytest.mark.parametrize("delay_s", [0.0, 0.004, 0.02, 0.033])
 def test_a_sampled_plant_is_that_of_its_own_hold_and_delay(delay_s: float) -> None:
     a, b = np.array([[-20.0]]), np.array([[300.0]])
-    system = continuous("roll", (a, b, ("p_radps",)), 0.4, 8.0, 20.0)
+    system = continuous("roll", (a, b, ("p_radps",)), 0.4, 8.0, 20.0, 1.0)
     plant = sampled(system, delay_s, 0.02)
     # Fine steps of an eighth of a millisecond, whose delay is whole: an integration of its own.
     fine = control.c2d(control.ss(*system, np.zeros((2, 1))), 1.25e-4)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -70,6 +71,18 @@ def test_less_knowledge_gives_softer_gains_and_what_is_found_holds() -> None:
     assert softer is not None
     mean = [np.median(unseen.judged(g)[0].crossover_radps) for g in (found.gains, softer)]
     assert mean[0] > mean[1]
+
+
+def test_an_aircraft_that_answers_the_other_way_is_unstable() -> None:
+    # The surfaces are connected as the estimate says: a draw of the other sign is fed back wrongly.
+    known = problem(0.0)
+    other = replace(known, axis=replace(known.axis, mean=np.array([-10.0, 150.0]),
+                    covariance=np.diag([0.0, 200.0**2])))  # fmt: skip
+    found = draw(other, seed=1, count=60)
+    drawn = other.axis.drawn(np.random.default_rng([1, 48]), 60)[:, 1]
+    gains = {"P": 0.2, "I": 0.1, "D": 0.0, "FF": 0.1, "TC": 0.5}
+    assert (drawn < 0.0).sum() > 5
+    assert not found.stable(gains)[drawn < 0.0].any()
 
 
 def test_an_axis_whose_sign_is_open_has_no_gains() -> None:

@@ -73,8 +73,9 @@ def actuator_of(aircraft: str, axis: str, travel_rad: float | None = None) -> Ac
     """
     surface = SURFACES[axis]
     loaded = load_measured(aircraft)
-    travel = travel_rad if travel_rad is not None else loaded.scalars.get(
-        f"surfaces.{surface}_limit_rad", 0.0)  # fmt: skip
+    travel = travel_rad
+    if travel is None:
+        travel = loaded.scalars.get(f"surfaces.{surface}_limit_rad", 0.0)
     if not travel > 0.0:
         raise ControlError(
             f"{aircraft}: no travel of the {surface}, which is the gain of its servo; measure the"

@@ -53,11 +53,11 @@ def margins(response: Spectra, frequency_radps: Array) -> Margins:
 
     # Odd multiples of 180 degrees between two frequencies.
     turns = (phase + np.pi) / (2.0 * np.pi)
-    low, high = np.minimum(turns[:, left], turns[:, right]), np.maximum(
-        turns[:, left], turns[:, right])  # fmt: skip
+    before, after = turns[:, left], turns[:, right]
+    low, high = np.minimum(before, after), np.maximum(before, after)
     crossed = np.floor(high) > np.floor(low)
-    span = np.where(turns[:, right] == turns[:, left], 1.0, turns[:, right] - turns[:, left])
-    at = np.clip((np.floor(high) - turns[:, left]) / span, 0.0, 1.0)
+    span = np.where(after == before, 1.0, after - before)
+    at = np.clip((np.floor(high) - before) / span, 0.0, 1.0)
     gain = np.abs(size[:, left] + at * (size[:, right] - size[:, left])) * 20.0 / np.log(10.0)
     gain_db = np.min(np.where(crossed, gain, FAR_DB), axis=1)
 

@@ -37,12 +37,14 @@ def continuous(
     travel_rad: float,
     bandwidth_hz: float,
     gyro_filter_hz: float,
+    sense: float,
 ) -> tuple[Array, Array, Array]:
     """Return A, B, C from share of travel to angle and filtered rate.
 
     States are the aircraft's, the angle where the model has none, the surface and the filter's two.
-    A surface angle counts positive as the aircraft's signs have it; the autopilots' outputs are
-    turned to a positive rate, so that every gain is positive.
+    A surface angle counts positive as the aircraft's signs have it. `sense` is 1 or -1, that of the
+    surface's moment as it was estimated: so the output is connected that every gain is positive.
+    An aircraft with the other sign is fed back wrongly.
     """
     a, b, states = dynamics
     n = len(states)
@@ -53,7 +55,7 @@ def continuous(
     surface, low, slope = total - 3, total - 2, total - 1
     full = np.zeros((total, total))
     full[:n, :n] = a
-    full[:n, surface] = b[:, 0] * np.sign(b[rate, 0])
+    full[:n, surface] = b[:, 0] * sense
     if own:
         full[at_angle, rate] = 1.0
     lag = 2.0 * math.pi * bandwidth_hz

@@ -185,7 +185,8 @@ def _scenario(
 ) -> Scenario:
     travel_rad, bandwidth_hz, delay_s = drive.tolist()
     axis, dynamics = problem.axis.axis, problem.axis.matrices(values, airspeed_mps)
-    system = continuous(axis, dynamics, travel_rad, bandwidth_hz, problem.structure.gyro_filter_hz)
+    filter_hz, sense = problem.structure.gyro_filter_hz, problem.axis.sense
+    system = continuous(axis, dynamics, travel_rad, bandwidth_hz, filter_hz, sense)
     plant = sampled(system, delay_s, problem.period_s)
     a, _, c = system
     left = 1j * w[:, None, None] * np.eye(len(a)) - a

@@ -45,15 +45,16 @@ def _axis_lines(one: AxisTuning) -> Iterator[str]:
             f" {proven.worst_phase_deg:.0f} deg in the worst of {UNSEEN} aircraft; 6 dB and 45 deg"
             " are asked"
         )
-        yield f"  widest: {_widest(one)}; fly more of it"
+        yield f"  least known: {_widest(one)}; fly more inputs of the {problem.actuator.surface}"
         return
     yield f"{one.axis}: at {speeds} m/s"
     changed = {change.name: change for change in one.changes}
     for role, value in one.design.gains.items():
         setting = problem.structure.settings[role]
         change = changed.get(setting.name)
-        old = "as before" if change is None else (
-            "before: not known" if change.old is None else f"before: {change.old:g}")  # fmt: skip
+        old = "as before"
+        if change is not None:
+            old = f"before: {'not known' if change.old is None else f'{change.old:g}'}"
         yield f"  {setting.name:18s} {value:8.4g} {setting.unit:13s} {old}"
     for name, loop in (("at the surface", proven.actuator), ("attitude", proven.attitude)):
         yield (
@@ -72,8 +73,8 @@ def _axis_lines(one: AxisTuning) -> Iterator[str]:
 def _widest(one: AxisTuning) -> str:
     """Return the derivatives with the widest shares of their row's main ones."""
     axis = one.problem.axis
-    moments = [n for n in axis.names if n[0] in "LM" and n.split("_")[1] in ("p", "q", "da", "de",
-               "alpha")]  # fmt: skip
+    main = ("p", "q", "da", "de", "alpha")
+    moments = [n for n in axis.names if n[0] in "LM" and n.split("_")[1] in main]
     value = dict(zip(axis.names, axis.mean.tolist(), strict=True))
     shares = sorted(((axis.half_width(n) / abs(value[n]), n) for n in moments), reverse=True)
     return ", ".join(f"{n} +- {100 * share:.0f} %" for share, n in shares[:2])

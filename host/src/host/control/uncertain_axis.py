@@ -12,6 +12,7 @@ import numpy as np
 from host.arrays import Array
 from host.constants import NORMAL_95
 from host.control.control_error import ControlError
+from host.control.plant import RATES
 from host.sysid.models import Trim, template
 
 if TYPE_CHECKING:
@@ -87,6 +88,12 @@ class UncertainAxis:
         a, b, _, _ = model.matrices(np.array(full))
         return a, b[:, :1], model.states
 
+    @property
+    def sense(self) -> float:
+        """1 or -1: the sign of the surface's moment as estimated."""
+        _, b, states = self.matrices(self.mean, self.trim.airspeed_mps)
+        return float(np.copysign(1.0, b[states.index(RATES[self.axis]), 0]))
+
     def half_width(self, name: str) -> float:
         """Return the 95 % half-width of one derivative."""
         k = self.names.index(name)
@@ -156,10 +163,14 @@ def axes_of_models(paths: Sequence[Path]) -> dict[str, UncertainAxis]:
             )
         if named[0] in found:
             raise ControlError(f"{path}: a second model of {named[0]}; name one of each axis")
-        names = tuple(one.name for one in model.parameters if one.name in POWERS)
-        sd = np.array([values[name][1] if name in values else 0.0 for name in names]) / NORMAL_95
-        mean = np.array([values[name][0] if name in values else model.start[
-            [one.name for one in model.parameters].index(name)] for name in names])  # fmt: skip
+        given = {
+            one.name: values.get(one.name, (start, 0.0))
+            for one, start in zip(model.parameters, model.start.tolist(), strict=True)
+            if one.name in POWERS
+        }
+        names = tuple(given)
+        mean, half = np.array(list(given.values())).T
+        sd = half / NORMAL_95
         found[named[0]] = UncertainAxis(
             named[0], model.name, at, names, mean, np.diag(sd**2), correlated=False
         )

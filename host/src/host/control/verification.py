@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -115,11 +116,12 @@ def verify(
 
     unseen = draw(problem, seed=seed, count=UNSEEN)
     w = unseen.frequency_radps
-    found = [
-        LoopMargins(*np.array([_margins(control, one, w) for one in loops]).T)
-        for loops in unseen.loops(gains)
-    ]
-    crossover = unseen.judged(gains)[0].crossover_radps
+    own = unseen.judged(gains)
+    found = []
+    for loops, known in zip(unseen.loops(gains), own, strict=True):
+        gain_db, phase_deg = np.array([_margins(control, one, w) for one in loops]).T
+        found.append(LoopMargins(gain_db, phase_deg, known.disk))
+    crossover = own[0].crossover_radps
     return Verification(
         found[0],
         found[1],
@@ -130,12 +132,9 @@ def verify(
     )
 
 
-def _margins(control: object, loop: Spectra, w: Array) -> tuple[float, float, float]:
+def _margins(control: Any, loop: Spectra, w: Array) -> tuple[float, float]:
     phase = np.rad2deg(np.unwrap(np.angle(loop)))
-    gains, phases, *_ = control.stability_margins(  # type: ignore[attr-defined]
-        (np.abs(loop), phase, w), returnall=True
-    )
+    gains, phases, *_ = control.stability_margins((np.abs(loop), phase, w), returnall=True)
     gain = np.min(np.abs(20.0 * np.log10(gains)), initial=FAR_DB)
     away = np.min(np.abs(phases), initial=FAR_DEG)
-    disk = 1.0 / np.max(np.abs(1.0 / (1.0 + loop) - 0.5))
-    return float(gain), float(away), float(min(disk, 2.0))
+    return float(gain), float(away)

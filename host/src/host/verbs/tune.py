@@ -40,13 +40,18 @@ def run(args: argparse.Namespace) -> int:
     """Tune and print."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.aircraft.origin import announce_aircraft
-    from host.control import ControlError, read_parameters, tune
+    from host.control import AUTOPILOTS, ControlError, read_parameters, tune
     from host.errors import ExitCode
-    from host.export.atomic_files import atomic_write
+    from host.export.atomic_files import atomic_write, check_destination
     from host.planning.identified_aircraft import is_model
     from host.readers.autopilot_flight import is_autopilot_log, read_autopilot
     from host.sysid.pipeline import identify
 
+    # Before minutes of work.
+    if args.autopilot not in AUTOPILOTS:
+        raise ControlError(f"--for {args.autopilot}, expected {', '.join(AUTOPILOTS)}")
+    if args.save is not None:
+        check_destination("--save", args.save, folder=False)
     announce_aircraft([args.aircraft])
     logged = read_parameters(args.parameters) if args.parameters else {}
     models = [one for one in args.source if is_model(one)]
