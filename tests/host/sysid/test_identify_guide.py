@@ -42,7 +42,7 @@ def test_it_is_that_of_a_flyable_file_with_the_same_numbers(tmp_path: Path) -> N
     assert airframe_data(mine(tmp_path, less)) == airframe_data("ultrastick25e")
     assert sensor_error_model(mine(tmp_path, less)) == sensor_error_model("ultrastick25e")
     ours, theirs = powerplant(mine(tmp_path, less)), powerplant("ultrastick25e")
-    assert ours.slope(700.0, 17.0, 1.2) == theirs.slope(700.0, 17.0, 1.2)
+    assert ours.settled_slopes(0.5, 17.0, 1.2) == theirs.settled_slopes(0.5, 17.0, 1.2)
     del document["servo"]  # usual servos then
     without = sensor_error_model(mine(tmp_path, dumps(document | {"kind": "measured"})))
     assert (without.servo_hz, without.servo) == (0.0, (8.0, 5.236))

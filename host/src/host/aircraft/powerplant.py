@@ -87,14 +87,6 @@ class Powerplant:
         by_speed = thrust(0.5, 0.0) - thrust(-0.5, 0.0)
         return by_speed, (thrust(0.0, 0.01) - thrust(0.0, -0.01)) / 0.02
 
-    def slope(self, spin_radps: float, airspeed_mps: float, density_kgpm3: float) -> float:
-        """Return how thrust changes with airspeed (N per m/s) at constant rotor speed."""
-        above, below = (
-            self.step(spin_radps, 0.5, airspeed_mps + half, density_kgpm3)[0]
-            for half in (0.5, -0.5)
-        )
-        return above - below
-
 
 class NoPropulsionError(AircraftError):
     """A measured aircraft without a section [propulsion]."""

@@ -74,6 +74,16 @@ def test_modes_need_no_inertia(folder: Path, answer: CoefficientAnswer) -> None:
         assert 1.96 * found[name].frequency_sd_radps < 0.02 * frequency
 
 
+def test_the_rotor_settles_within_a_phugoid(folder: Path, answer: CoefficientAnswer) -> None:
+    """Held at its speed it damps the phugoid twice as much."""
+    truth = read_truth(folder / "flight.truth.toml")["maneuver"]
+    found = next(m for m in answer.modes if m.name == "phugoid")
+    expected = [m["modes"]["phugoid"] for m in truth if "elevator" in m["axes"]]
+    frequency, damping = (sum(x) / len(x) for x in zip(*expected, strict=True))
+    assert found.frequency_radps == pytest.approx(frequency, rel=0.03)
+    assert found.damping == pytest.approx(damping, rel=0.1)
+
+
 def test_another_inertia_than_the_fit_used_moves_the_modes(answer: CoefficientAnswer) -> None:
     frame = airframe_data(NAME)
     heavy = AirframeData(

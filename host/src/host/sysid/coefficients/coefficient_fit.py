@@ -54,7 +54,7 @@ class ThrustEffect:
     ----------
     thrust_n : float
     slope_npmps : float
-        Its derivative by airspeed at constant rotor speed.
+        Its derivative by airspeed, rotor speed settled.
     arm_m : float
         Pitching moment per newton.
     """
