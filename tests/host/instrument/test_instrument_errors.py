@@ -53,14 +53,14 @@ def test_lines_of_a_calibration_reach_identification(tmp_path: Path) -> None:
     slope = 2.0 * math.pi / 1024.0
     assert found["alpha_zero_rad"] == pytest.approx(6.0 * slope / math.sqrt(2.0))
     assert found["beta_scale"] == pytest.approx(0.01 / math.sqrt(2.0))
-    assert found["pitot_drift_pa"] == pytest.approx(51.2 * 4.8828125 / math.sqrt(2.0))
+    assert found["pitot_zero_pa"] == pytest.approx(51.2 * 4.8828125 / math.sqrt(2.0))
     assert found["pitot_scale"] == pytest.approx(0.025 / math.sqrt(2.0))
     assert found["elevator_scale"] == pytest.approx(0.05)
     assert found["aileron_scale"] == pytest.approx(0.05 / math.sqrt(2.0))
     assert found["gyro_x_bias_radps"] == pytest.approx(0.349)
     assert found["accel_z_scale"] == pytest.approx(0.03)
     before = prior(data)
-    assert before["gyro_bias_x_radps"][1] == pytest.approx(0.349)
+    assert before["gyro_x_bias_radps"][1] == pytest.approx(0.349)
     assert before["beta_zero_rad"][1] == pytest.approx(6.0 * slope / math.sqrt(2.0))
 
 
@@ -84,7 +84,7 @@ def test_a_log_made_with_default_lines_has_sensors_out_of_the_box(tmp_path: Path
     found = deviations(known.flown(replace(table, calibration=default)), airframe_data(NAME))
     # hw/calibration/default.toml: a vane mounted by eye, a pitot untared
     assert found["alpha_zero_rad"] == pytest.approx(np.deg2rad(2.1) / math.sqrt(2.0), rel=0.01)
-    assert found["pitot_drift_pa"] == pytest.approx(250.0 / math.sqrt(2.0))
+    assert found["pitot_zero_pa"] == pytest.approx(250.0 / math.sqrt(2.0))
     assert found["elevator_scale"] == pytest.approx(0.05)
     path = measured(tmp_path)
     own = load_calibration(path)

@@ -24,6 +24,7 @@ from host.physical.recording import FOREIGN, OWN, Recording
 LEAST_LAG_S = 1e-5  # stands for no low-pass at all, so that its bandwidth stays finite
 LEAST_CLOCK_SHARE = 1e-5  # GPS leaves 0.2 ppm, far too little to change an interval
 VANE_DELAY_S = 8e-3  # usual vane delay at trim, of which the filter model's error is a share
+VANES = {"alpha": ("alpha_a", "alpha_b"), "beta": ("beta_a", "beta_b")}
 POTS = {
     "elevator": ("pot_elevator",),
     "aileron": ("pot_aileron_left", "pot_aileron_right"),
@@ -156,12 +157,11 @@ def deviations(instrument: SensorErrorModel, airframe: AirframeData) -> dict[str
         By name; a name ends in the unit of its value.
     """
     e = instrument.errors
-    vanes = {"alpha": ("alpha_a", "alpha_b"), "beta": ("beta_a", "beta_b")}
     lag_share = {
         name: math.hypot(
             e["delay_share"].of_mean(*pair), e["filter_model_s"].of_mean(pair[0]) / VANE_DELAY_S
         )
-        for name, pair in vanes.items()
+        for name, pair in VANES.items()
     }
     result = {
         "mass_share": airframe.mass_share,
@@ -170,12 +170,12 @@ def deviations(instrument: SensorErrorModel, airframe: AirframeData) -> dict[str
         "izz_share": airframe.inertia_share,
         "vane_x_m": e["place_m"].of_mean("vane_a", "vane_b"),
         "vane_z_m": e["place_m"].of_mean("vane_a", "vane_b"),
-        "alpha_scale": e["vane_scale"].of_mean(*vanes["alpha"]),
-        "beta_scale": e["vane_scale"].of_mean(*vanes["beta"]),
+        "alpha_scale": e["vane_scale"].of_mean(*VANES["alpha"]),
+        "beta_scale": e["vane_scale"].of_mean(*VANES["beta"]),
         "upwash_share": e["upwash_share"].of_mean(),
-        "alpha_zero_rad": e["vane_zero_rad"].of_mean(*vanes["alpha"]),
+        "alpha_zero_rad": e["vane_zero_rad"].of_mean(*VANES["alpha"]),
         "pitot_scale": e["pitot_scale"].of_mean(),
-        "pitot_drift_pa": e["pitot_zero_pa"].of_mean(),
+        "pitot_zero_pa": e["pitot_zero_pa"].of_mean(),
         "density_share": e["density_share"].of_mean(),
         "imu_delay_s": imu_delay_s(instrument),
         "alpha_lag_share": lag_share["alpha"],
@@ -199,7 +199,7 @@ def deviations(instrument: SensorErrorModel, airframe: AirframeData) -> dict[str
             f"gyro_{axis}_bias_radps": e["gyro_bias_radps"].sigma(axis),
             f"accel_{axis}_scale": e["accel_scale"].sigma(axis),
             f"accel_{axis}_bias_mps2": e["accel_bias_mps2"].sigma(axis),
-            f"tilt_{axis}_rad": e["misalignment_rad"].sigma(axis),
+            f"imu_tilt_{axis}_rad": e["misalignment_rad"].sigma(axis),
         }
     return {name: float(value) for name, value in result.items()}
 

@@ -22,6 +22,7 @@ STANDARD = Path(__file__).with_name("standard.toml")
 UNIFORM_SD_PER_HALF_WIDTH = 1.0 / math.sqrt(3.0)  # "even" in the files
 DISTRIBUTIONS = ("even", "normal")
 DRAWN = ("instrument", "flight")
+CALIBRATION_FILE, AIRCRAFT_FILE = "calibration file", "aircraft file"
 KEYS = ("sigma", "half_width", "distribution", "drawn", "shared", "source")
 # Lines of a calibration and the errors their zero and slope have.
 LINES = {
@@ -59,6 +60,8 @@ class NamedError:
     source : str
     aircraft_file : str
         The tolerance of an aircraft file that gives it; empty: none.
+    origins : tuple of str
+        Where each width comes from, one per sensor; empty: from `source`, a default.
     """
 
     name: str
@@ -69,6 +72,7 @@ class NamedError:
     shared: tuple[str, ...]
     source: str
     aircraft_file: str = ""
+    origins: tuple[str, ...] = ()
 
     @property
     def sigmas(self) -> tuple[float, ...]:
@@ -78,6 +82,16 @@ class NamedError:
     def sigma(self, sensor: str) -> float:
         """Return one standard deviation of a sensor's error."""
         return self.sigmas[self.sensors.index(sensor)]
+
+    @property
+    def origin_of_each(self) -> tuple[str, ...]:
+        """Where the width of each sensor comes from: a file, or a default with its source."""
+        return self.origins or (f"default: {self.source}",) * len(self.sensors)
+
+    def origin(self, *sensors: str) -> str:
+        """Return where the deviation of these sensors (no names: of all) comes from."""
+        each = dict(zip(self.sensors, self.origin_of_each, strict=True))
+        return ", ".join(dict.fromkeys(each[s] for s in sensors or self.sensors))
 
     def of_mean(self, *sensors: str) -> float:
         """Return one standard deviation of the mean error of these sensors (no names: of all)."""
@@ -170,7 +184,13 @@ def instrument_errors(
             if error.aircraft_file:
                 tolerance = aircraft.scalar(error.aircraft_file)
                 source = aircraft.sources.get(error.aircraft_file, error.source)
-                found[name] = replace(error, width=(tolerance,) * len(error.sensors), source=source)
+                count = len(error.sensors)
+                found[name] = replace(
+                    error,
+                    width=(tolerance,) * count,
+                    source=source,
+                    origins=(AIRCRAFT_FILE,) * count,
+                )
     if calibration is not None:
         for name, line in calibration.lines.items():
             if defaults or not line.default:
@@ -185,7 +205,8 @@ def instrument_errors(
                 raise CalibrationError(
                     f"{where} belongs into the aircraft file, as {found[name].aircraft_file}"
                 )
-            found[name] = _apply_table(found[name], table, where)
+            stated = (CALIBRATION_FILE,) * len(found[name].sensors)
+            found[name] = replace(_apply_table(found[name], table, where), origins=stated)
     return InstrumentErrors(found)
 
 
@@ -203,13 +224,18 @@ def _apply_line(found: dict[str, NamedError], name: str, line: Line) -> None:
         sensors, by_zero = (channel,), line.zero_sigma * abs(line.slope[0])
     else:
         return
+    own = f"default: {line.source}" if line.default else CALIBRATION_FILE
     for error, sigma in ((zero, by_zero), (scale, line.slope_sigma)):
         old = found[error]
         width = sigma / _sd_per_width(old.distribution)
         widths = tuple(
             width if s in sensors else w for s, w in zip(old.sensors, old.width, strict=True)
         )
-        found[error] = replace(old, width=widths, source=line.source)
+        origins = tuple(
+            own if s in sensors else before
+            for s, before in zip(old.sensors, old.origin_of_each, strict=True)
+        )
+        found[error] = replace(old, width=widths, source=line.source, origins=origins)
 
 
 def _apply_table(error: NamedError, table: Mapping[str, object], where: str) -> NamedError:

@@ -346,7 +346,7 @@ def _errors(
         replace(none, density_share=DENSITY_SHARE),
     ]
     if axis != PITCH:
-        found.append(replace(none, tilt_rad=e["tilt_y_rad"]))
+        found.append(replace(none, tilt_rad=e["imu_tilt_y_rad"]))
     return found
 
 

@@ -99,7 +99,7 @@ def test_another_inertia_than_the_fit_used_moves_the_modes(answer: CoefficientAn
 
 def test_modes_need_no_zero_of_the_pitot(answer: CoefficientAnswer) -> None:
     fit, drift_pa = answer.fit, 6.0
-    (was, sd), frame = fit.errors["pitot_drift_pa"], airframe_data(NAME)
+    (was, sd), frame = fit.errors["pitot_zero_pa"], airframe_data(NAME)
     more = (fit.condition.qbar_pa - was) / (fit.condition.qbar_pa - was - drift_pa)
     assert more > 1.02
     rates = tuple(f"_{k}" for k in "pqr")
@@ -107,7 +107,7 @@ def test_modes_need_no_zero_of_the_pitot(answer: CoefficientAnswer) -> None:
         replace(d, value=d.value * (more**0.5 if d.name.endswith(rates) else more))
         for d in fit.derivatives
     )
-    errors = fit.errors | {"pitot_drift_pa": (was + drift_pa, sd)}
+    errors = fit.errors | {"pitot_zero_pa": (was + drift_pa, sd)}
     other = coefficient_modes(replace(fit, derivatives=scaled, errors=errors), frame)
     for mode, same in zip(answer.modes, other, strict=True):
         if mode.name in ("short period", "dutch roll"):

@@ -146,7 +146,8 @@ def test_an_error_shifts_the_derivatives_as_the_fit_says(
 ) -> None:
     data = sensor_error_model(NAME)
     still = fitted(flight, data)
-    moved = fitted(flight, data, gains={column: 1.0 + still.error_deviations[error]})
+    size = next(e.deviation for e in still.error_sources if e.name == error)
+    moved = fitted(flight, data, gains={column: 1.0 + size})
     said = still.error_shifts[error]
     found = [b.value - a.value for a, b in zip(still.derivatives, moved.derivatives, strict=True)]
     own = np.array([d.half_width for d in still.derivatives]) / NORMAL_95

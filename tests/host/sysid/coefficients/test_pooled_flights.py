@@ -32,7 +32,7 @@ def fit(values: Array, noise: Array = NOISE, errors: Array = ERRORS) -> Coeffici
             for n, v, s in zip(names, values, sd, strict=False)
         ),
         covariance=covariance,
-        errors={"cg_x_m": (0.1, float(errors[0])), "tilt_y_rad": (0.0, float(errors[1]))},
+        errors={"cg_x_m": (0.1, float(errors[0])), "imu_tilt_y_rad": (0.0, float(errors[1]))},
         condition=MeanCondition(
             17.0, 180.0, 0.1, 0.3, 0.03, ThrustEffect(2.0, 0.1, 0.0), (0.0, 0.2), (1.0, 1.0)
         ),
@@ -69,10 +69,10 @@ def test_the_sharper_flight_counts_more() -> None:
 def test_an_error_that_one_flight_has_is_certain_in_the_other() -> None:
     """A flight with GPS and pots beside one without: the clock is no error of the first."""
     first = fit(np.array([4.0, -11.0]))
-    own = {"clock_share": first.errors["cg_x_m"], "tilt_y_rad": first.errors["tilt_y_rad"]}
+    own = {"clock_share": first.errors["cg_x_m"], "imu_tilt_y_rad": first.errors["imu_tilt_y_rad"]}
     alone = replace(first, errors=own)
     found = pool_fits([first, alone])
-    assert tuple(found.errors) == ("cg_x_m", "tilt_y_rad", "clock_share")
+    assert tuple(found.errors) == ("cg_x_m", "imu_tilt_y_rad", "clock_share")
     for name in ("cg_x_m", "clock_share"):
         assert found.errors[name] == pytest.approx((0.1, 0.5))
     # Either moves half of the answer by its 0.06, and they are two errors, not one.

@@ -12,9 +12,9 @@ from host.aircraft.mass_properties import Condition, airframe_data
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.instrument.deviations import sensor_error_model
+from host.instrument.error_list import conversion_errors
 from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
 from host.sysid.conversion.derivative_conversion import (
-    CONSIDERED_ERRORS,
     ConversionPoint,
     Quantities,
     consider_deviations,
@@ -48,7 +48,7 @@ def test_there_and_back_is_the_same_with_its_covariance() -> None:
     start = given()
     out = to_derivatives(start, PLACE, ERRORS)
     back = to_coefficients(out, PLACE, {})
-    assert back.names == (*TRUE, *CONSIDERED_ERRORS)
+    assert back.names == (*TRUE, *conversion_errors())
     np.testing.assert_allclose(back.values[: len(TRUE)], start.values, rtol=1e-12)
     scale = np.sqrt(np.diag(start.covariance))
     gap = back.covariance[: len(TRUE), : len(TRUE)] - start.covariance
@@ -81,7 +81,7 @@ def test_drawn_aircraft_scatter_as_the_covariance_says() -> None:
     ixx, iyy, izz = (
         getattr(a, f"{i}_kgm2") * (1.0 + e[f"{i}_share"]) for i in ("ixx", "iyy", "izz")
     )
-    qbar = (at.qbar_pa - e["pitot_drift_pa"]) / (1.0 + e["pitot_scale"])
+    qbar = (at.qbar_pa - e["pitot_zero_pa"]) / (1.0 + e["pitot_scale"])
     V = at.airspeed_mps * np.sqrt(qbar / at.qbar_pa / (1.0 + e["density_share"]))
     force = qbar * a.wing_area_m2
     vane = (
@@ -122,7 +122,7 @@ def test_coefficients_of_drawn_derivatives_scatter_as_the_covariance_says() -> N
     d = dict(zip(exact.names, drawn, strict=True))
     e = {n: sd * rng.standard_normal(drawn.shape[1]) for n, sd in ERRORS.items()}
     a, at = AIRFRAME, PLACE.condition
-    qbar = (at.qbar_pa - e["pitot_drift_pa"]) / (1.0 + e["pitot_scale"])
+    qbar = (at.qbar_pa - e["pitot_zero_pa"]) / (1.0 + e["pitot_scale"])
     V = at.airspeed_mps * np.sqrt(qbar / at.qbar_pa / (1.0 + e["density_share"]))
     force = qbar * a.wing_area_m2
     upwash = (1.0 + a.upwash * (1.0 + e["upwash_share"])) / (1.0 + a.upwash)

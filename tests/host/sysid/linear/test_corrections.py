@@ -101,7 +101,7 @@ def test_an_instrument_that_errs_is_put_right_to_the_digit() -> None:
     for kind, sensor, unit in (("pqr", "gyro", "radps"), (("ax", "ay", "az"), "accel", "mps2")):
         body = turned @ np.stack([true[f"{k}_{unit}"] for k in kind])
         for row, k, a in zip(body, kind, "xyz", strict=True):
-            scale, bias = errors[f"{sensor}_scale_{a}"], errors[f"{sensor}_bias_{a}_{unit}"]
+            scale, bias = errors[f"{sensor}_{a}_scale"], errors[f"{sensor}_{a}_bias_{unit}"]
             measured[f"{k}_{unit}"] = (1.0 + scale) * row + bias
     for name in ("alpha", "beta"):
         angle = (1.0 + errors[f"{name}_scale"]) * true[f"{name}_rad"] + errors[f"{name}_zero_rad"]
@@ -121,7 +121,7 @@ def test_an_instrument_that_errs_is_put_right_to_the_digit() -> None:
 def test_only_what_is_told_is_taken_out() -> None:
     found = Compatibility(
         (
-            finding("gyro_scale_x", 0.01, 0.003, 0.0113),
+            finding("gyro_x_scale", 0.01, 0.003, 0.0113),
             finding("alpha_scale", -0.02, 0.03, 0.0288),
             finding("pitot_scale", 0.01, 0.03, 0.031),
             finding("wind_north_mps", -3.0, 0.1, 19.6),
@@ -130,9 +130,9 @@ def test_only_what_is_told_is_taken_out() -> None:
         (),
         gps=True,
     )
-    assert [c.name for c in corrections(found)] == ["gyro_scale_x"]
+    assert [c.name for c in corrections(found)] == ["gyro_x_scale"]
     left = residual_deviations(found)
-    assert left["gyro_scale_x"] == pytest.approx(0.003 / 1.96, rel=1e-3)
+    assert left["gyro_x_scale"] == pytest.approx(0.003 / 1.96, rel=1e-3)
     assert left["alpha_scale"] == pytest.approx(0.0288 / 1.96, rel=1e-3)
     assert "wind_north_mps" not in left
     # 3 % of pitot, evenly, two of them, against 1 % of density.
@@ -179,7 +179,7 @@ def test_sensors_that_do_not_agree_are_as_open_as_their_file_leaves_them(
     k = parts.names.index("Cm_de")
     values = dict(zip(parts.names, parts.values, strict=True))
     assert abs(sensed["elevator_scale"][k] / values["Cm_de"]) == pytest.approx(share, rel=0.05)
-    assert {"alpha_scale", "gyro_scale_y", "imu_x_m"} <= sensed.keys()
+    assert {"alpha_scale", "gyro_y_scale", "imu_x_m"} <= sensed.keys()
     assert np.any(sensed[HOLD] != 0.0)  # surfaces that their file measures move between samples
     assert not {"vane_delay_s", "imu_delay_s", "pitot_delay_s"} & sensed.keys()
 
@@ -222,7 +222,7 @@ def test_one_step_foretells_the_fit_of_disturbed_data() -> None:
     trim = Trim(17.0, float(columns["alpha_rad"].mean()), 0.08)
     model = template("short-period", trim)
     result = fit("output-error-white", model, [maneuver])
-    size = {"gyro_scale_y": 0.01, "alpha_scale": 0.01, "pitot_scale": 0.02}
+    size = {"gyro_y_scale": 0.01, "alpha_scale": 0.01, "pitot_scale": 0.02}
     found = Compatibility(
         tuple(finding(n, 0.0, 1.96 * s, 1.96 * s) for n, s in size.items()), {}, (), gps=True
     )
@@ -373,7 +373,12 @@ def test_the_verb_says_what_it_corrected_and_can_leave_it(
     options += ["--method", "equation-error"]
     assert main([*options, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)["answers"][0]
-    assert answer["corrections"]["gyro_bias_x_radps"]["half_width"] > 0.0
+    assert answer["corrections"]["gyro_x_bias_radps"]["half_width"] > 0.0
+    origin = {error["name"]: error["origin"] for error in answer["errors"]}
+    assert origin["gyro_x_bias_radps"] == "reconstruction of this flight"
+    assert origin["mass_share"] == "aircraft file"
+    assert origin["elevator_scale"].startswith("default: two angles on a protractor")
+    assert min(error["deviation"] for error in answer["errors"]) > 0.0
     assert any("taken out of the columns" in line for line in answer["verdict"])
     assert main([*options, "--json", "--no-corrections"]) == 0
     plain = json.loads(capsys.readouterr().out)["answers"][0]

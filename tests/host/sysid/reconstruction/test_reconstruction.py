@@ -54,10 +54,10 @@ def truth(record: FlightRecord) -> dict[str, float]:
     v = record.draws.vector
     found: dict[str, float] = {}
     for k, a in enumerate("xyz"):
-        found[f"gyro_bias_{a}_radps"] = v("gyro_bias_radps")[k]
-        found[f"gyro_scale_{a}"] = v("gyro_scale_share")[k]
-        found[f"accel_bias_{a}_mps2"] = v("accel_bias_mps2")[k]
-        found[f"accel_scale_{a}"] = v("accel_scale_share")[k]
+        found[f"gyro_{a}_bias_radps"] = v("gyro_bias_radps")[k]
+        found[f"gyro_{a}_scale"] = v("gyro_scale_share")[k]
+        found[f"accel_{a}_bias_mps2"] = v("accel_bias_mps2")[k]
+        found[f"accel_{a}_scale"] = v("accel_scale_share")[k]
         found[f"imu_tilt_{a}_rad"] = v("misalignment_rad")[k]
     upwash = AIRFRAME.upwash
     lift = (1.0 + upwash * (1.0 + v("upwash_share"))) / (1.0 + upwash)
@@ -147,9 +147,9 @@ def test_errors_of_recorded_flights_are_inside_their_intervals() -> None:
                 informed.add(name)
         assert abs(found["vane_delay_s"].value - true["vane_delay_s"]) < 0.003
     assert np.mean(inside) > 0.88
-    assert {f"gyro_bias_{a}_radps" for a in "xyz"} <= informed
+    assert {f"gyro_{a}_bias_radps" for a in "xyz"} <= informed
     assert {
-        "accel_bias_x_mps2",
+        "accel_x_bias_mps2",
         "wind_north_mps",
         "wind_east_mps",
     } <= informed
@@ -190,8 +190,8 @@ def test_injected_bias_scale_and_delay_come_back() -> None:
     def moved(name: str) -> float:
         return after[name].value - before[name].value
 
-    assert moved("gyro_bias_y_radps") == pytest.approx(0.006, abs=2e-4)
-    assert moved("accel_bias_y_mps2") == pytest.approx(-0.15, abs=0.03)
+    assert moved("gyro_y_bias_radps") == pytest.approx(0.006, abs=2e-4)
+    assert moved("accel_y_bias_mps2") == pytest.approx(-0.15, abs=0.03)
     assert moved("vane_delay_s") == pytest.approx(0.006, abs=1e-3)
     # The calibration's own word, 2.4 %, pulls at it.
     assert 0.01 < moved("beta_scale") < 0.045

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import AirframeData
 from host.instrument.deviations import sensor_error_model
-from host.instrument.error_labels import ERROR_LABELS
+from host.instrument.error_list import error_kinds
 from host.physical.recording import AUTOPILOT, FOREIGN, Recording
 from host.sysid import Maneuver
 from host.sysid.errors import systematic_error_shifts
@@ -96,8 +96,8 @@ def test_every_error_that_moves_an_answer_has_words() -> None:
     assert {
         *INSTANTANEOUS_ERRORS,
         *residual_errors(delayed(0.007), still(10)),
-    } <= ERROR_LABELS.keys()
-    assert not any("_" in words for words in ERROR_LABELS.values())
+    } <= error_kinds().keys()
+    assert not any("_" in kind.label for kind in error_kinds().values())
 
 
 def test_a_place_is_felt_by_what_sits_there() -> None:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import pytest
 from host.instrument.deviations import unknown_sensors
-from host.instrument.error_labels import recording_notes
+from host.instrument.recording_notes import recording_notes
 from host.physical.recording import Recording
 from host.sysid.reconstruction.path_preparation import prior
 
 
 def test_priors_of_a_table_of_others_are_wide() -> None:
     ours, theirs = (prior(unknown_sensors(Recording(maker=m))) for m in ("own", "foreign"))
-    for name in ("alpha_scale", "beta_scale", "alpha_zero_rad", "pitot_scale", "gyro_scale_x",
-                 "accel_bias_z_mps2", "gyro_bias_y_radps"):  # fmt: skip
+    for name in ("alpha_scale", "beta_scale", "alpha_zero_rad", "pitot_scale", "gyro_x_scale",
+                 "accel_z_bias_mps2", "gyro_y_bias_radps"):  # fmt: skip
         assert theirs[name][1] > 1.7 * ours[name][1], name
 
 

@@ -13,6 +13,10 @@ from host.fleet.statistics.reference_cg import Place, about_cg
 if TYPE_CHECKING:
     import pandas as pd
 
+# Errors as rows of released versions call them.
+RELEASED_NAMES = {f"tilt_{axis}_rad": f"imu_tilt_{axis}_rad" for axis in "xyz"} | {
+    "pitot_drift_pa": "pitot_zero_pa"
+}
 CONDITIONS = (
     "airspeed_mps", "alpha_rad", "lift", "drag", "chord_m", "span_m", "mass_kg",
 )  # fmt: skip
@@ -45,7 +49,8 @@ def _watched(row: dict[Any, Any]) -> dict[str, tuple[float, float]]:
 
 def _flight(row: dict[Any, Any], at: Place) -> LoadedFlight:
     names = tuple(row["parameters"])
-    errors, count = list(row["errors"]), len(names)
+    errors = [RELEASED_NAMES.get(name, name) for name in row["errors"]]
+    count = len(names)
     flight = LoadedFlight(
         aircraft=str(row["aircraft"]),
         names=names,

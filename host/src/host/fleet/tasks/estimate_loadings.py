@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
-from host.instrument.error_sources import error_source
+from host.instrument.error_sources import error_owner
 from host.instrument.instrument_errors import InstrumentErrors
 from host.sysid.coefficients import CoefficientFit
 
@@ -91,7 +91,7 @@ def split_covariance(
     kept = [
         (name, source, shift)
         for name, shift in shifts.items()
-        if (source := error_source(name, errors)) != "flight"
+        if (source := error_owner(name, errors)) != "flight"
         and bool(np.any(shift**2 > _SMALL_SHARE * variances))
     ]
     loadings = np.array([shift for _, _, shift in kept]).reshape(-1, len(names))

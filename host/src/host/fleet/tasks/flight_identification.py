@@ -195,7 +195,7 @@ def _commanded_lag(fit: CoefficientFit) -> Watched:
     if SERVO_DELAY not in fit.errors:
         return {}
     value, sd = fit.errors[SERVO_DELAY]
-    before = fit.error_deviations.get(SERVO_DELAY, 0.0)
+    before = next((e.deviation for e in fit.error_sources if e.name == SERVO_DELAY), 0.0)
     if not 0.0 < sd < _POSTERIOR_PRIOR_RATIO * before:
         return {}
     information = 1.0 / sd**2 - 1.0 / before**2

@@ -13,23 +13,10 @@ import numpy as np
 from host.arrays import Array
 from host.constants import NORMAL_95
 from host.fleet.tasks.estimate_loadings import LoadedEstimates, split_covariance
-from host.instrument.error_labels import ERROR_LABELS
+from host.instrument.error_list import VANE, conversion_cause, error_kinds
 from host.instrument.instrument_errors import InstrumentErrors
-from host.sysid.aerodynamics.coefficient_table import QBAR, SHARED, VANE, CoefficientParts
+from host.sysid.aerodynamics.coefficient_table import CoefficientParts
 from host.sysid.linear import Answer
-
-# As the coefficients' own fit calls them: flights of both kinds share an error by its name.
-_ASSUMED = {
-    "mass": "mass_share", "Ixx": "ixx_share", "Iyy": "iyy_share", "Izz": "izz_share",
-    QBAR: "pitot_scale", VANE: "upwash_share",
-}  # fmt: skip
-_SENSED = {
-    **{f"gyro_bias_{axis}_radps": f"gyro_{axis}_bias_radps" for axis in "xyz"},
-    **{f"gyro_scale_{axis}": f"gyro_{axis}_scale" for axis in "xyz"},
-    **{f"accel_bias_{axis}_mps2": f"accel_{axis}_bias_mps2" for axis in "xyz"},
-    **{f"accel_scale_{axis}": f"accel_{axis}_scale" for axis in "xyz"},
-    **{f"imu_tilt_{axis}_rad": f"tilt_{axis}_rad" for axis in "xyz"},
-}
 
 
 def linear_loadings(answers: Sequence[Answer], errors: InstrumentErrors) -> LoadedEstimates:
@@ -51,7 +38,7 @@ def linear_loadings(answers: Sequence[Answer], errors: InstrumentErrors) -> Load
         wider = parts.quantile / NORMAL_95
         own[here, here] = parts.statistical * np.outer(wider, wider)
         for error, shift in _shifts(parts).items():
-            if error in ERROR_LABELS or error in _SENSED.values() or error in _ASSUMED.values():
+            if error in error_kinds():
                 shifts.setdefault(error, np.zeros(len(names)))[here] = shift
             else:  # an error of the model in this flight, not of a sensor
                 own[here, here] += np.outer(shift, shift)
@@ -61,18 +48,15 @@ def linear_loadings(answers: Sequence[Answer], errors: InstrumentErrors) -> Load
 
 
 def _shifts(parts: CoefficientParts) -> dict[str, Array]:
-    (
-        """Return the shifts by one deviation of every error.
+    """Return the shifts by one deviation of every error.
 
     Vane errors and upwash together have the larger of the variances sensed and assumed.
     """
-        ""
-    )
-    found = {_SENSED.get(error, error): shift for error, shift in parts.sensed}
-    vanes = [shift**2 for error, shift in parts.sensed if SHARED.get(error) == VANE]
-    for cause, shift in parts.assumed.items():
+    found = dict(parts.sensed)
+    vanes = [shift**2 for error, shift in parts.sensed if conversion_cause(error) == VANE]
+    for error, shift in parts.assumed.items():
         left = shift
-        if cause == VANE and vanes:
+        if conversion_cause(error) == VANE and vanes:
             left = np.sign(shift) * np.sqrt(np.maximum(shift**2 - np.sum(vanes, axis=0), 0.0))
-        found[_ASSUMED[cause]] = left
+        found[error] = left
     return found

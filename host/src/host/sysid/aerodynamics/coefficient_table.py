@@ -16,7 +16,7 @@ from host.aircraft.mass_properties import AirframeData, Condition
 from host.arrays import Array
 from host.constants import NORMAL_95
 from host.instrument.deviations import dynamic_pressure_share
-from host.instrument.error_labels import ERROR_LABELS
+from host.instrument.error_list import QBAR, conversion_cause
 from host.instrument.instrument_errors import InstrumentErrors, standard_errors
 from host.sysid.aerodynamics.path_thrust import PathThrust
 from host.sysid.models.consider_covariance import consider_covariance, dominant_error_source
@@ -77,7 +77,8 @@ class CoefficientParts:
     quantile : Array, shape (K,)
         Of a two-sided 95 % interval, in standard errors: Student's where maneuvers are few.
     assumed : dict of str to (K,) Array
-        Shift by one standard deviation of mass, inertia, dynamic pressure and upwash, by cause.
+        Shift by one standard deviation of mass, inertia, thrust and upwash, and of the pitots where
+        `sensed` has nothing of them, by error.
     sensed : tuple of (str, (K,) Array)
         Shift by one standard deviation of each sensor error.
     """
@@ -130,21 +131,23 @@ def coefficient_parts(
 
     value = converted(result.estimate, airframe, condition)
     assumed: dict[str, Array] = {
-        cause: (converted(result.estimate, a, at) - value) / PERTURBATION * share
-        for cause, (share, a, at) in _perturbed_mass_properties(airframe, condition).items()
+        error: (converted(result.estimate, a, at) - value) / PERTURBATION * share
+        for error, (share, a, at) in _perturbed_mass_properties(airframe, condition).items()
     }
     if path_thrust.deviation_n > 0.0:
         more = replace(path_thrust, along_n=path_thrust.along_n + path_thrust.deviation_n)
-        assumed[THRUST] = converted(result.estimate, airframe, condition, more) - value
-    if not any(SHARED.get(m.error) == QBAR for m in shifts):
+        assumed["thrust_share"] = converted(result.estimate, airframe, condition, more) - value
+    if not any(conversion_cause(m.error) == QBAR for m in shifts):
         # Coefficients go with dynamic pressure inversely.
-        assumed[QBAR] = -value * dynamic_pressure_share(
+        assumed["pitot_scale"] = -value * dynamic_pressure_share(
             errors or standard_errors(), condition.qbar_pa
         )
     # An angle that is told by accelerations saw no vane, and no upwash.
     seen = [f"_{y.removesuffix('_rad')}" for y in ANGLES if y in result.model.outputs]
     of_flow_angle = np.array([name.endswith(tuple(seen)) for name in names])
-    assumed[VANE] = np.asarray(of_flow_angle * value * airframe.upwash * airframe.upwash_share)
+    assumed["upwash_share"] = np.asarray(
+        of_flow_angle * value * airframe.upwash * airframe.upwash_share
+    )
     sensed = []
     for m in shifts:
         there = Condition(condition.airspeed_mps * m.airspeed_gain, condition.qbar_pa * m.qbar_gain)
@@ -168,8 +171,7 @@ def coefficients(parts: CoefficientParts) -> tuple[Coefficient, ...]:
     """
     sensed: dict[str, list[Array]] = {}
     for error, shift in parts.sensed:
-        cause = SHARED.get(error) or ERROR_LABELS.get(error, error)
-        sensed.setdefault(cause, []).append(shift)
+        sensed.setdefault(conversion_cause(error), []).append(shift)
     variances = _variances(parts.assumed, sensed)
     extra = sum(variances.values(), np.zeros(len(parts.names)))
     fit_error = np.sqrt(np.diag(parts.statistical))
@@ -197,31 +199,27 @@ def _variances(assumed: dict[str, Array], sensed: dict[str, list[Array]]) -> dic
     found = {
         cause: np.diag(consider_covariance(np.stack(shifts))) for cause, shifts in sensed.items()
     }
-    for cause, shift in assumed.items():
+    for error, shift in assumed.items():
+        cause = conversion_cause(error)
         allowed = np.diag(consider_covariance(shift[None]))
         found[cause] = np.maximum(allowed, found.get(cause, 0.0))
     return found
 
 
 PERTURBATION = 1e-4  # share by which a mass property is changed for its sensitivity
-QBAR, VANE, THRUST = "dynamic pressure", "vanes", "thrust"
 ANGLES = ("alpha_rad", "beta_rad")
-SHARED = {
-    "pitot_scale": QBAR, "pitot_zero_pa": QBAR, "density_share": QBAR,
-    "alpha_scale": VANE, "beta_scale": VANE,
-}  # fmt: skip
 
 
 def _perturbed_mass_properties(
     a: AirframeData, at: Condition
 ) -> dict[str, tuple[float, AirframeData, Condition]]:
-    """Return tolerance, airframe and condition with each mass property perturbed, by its name."""
+    """Return tolerance, airframe and condition with each mass property perturbed, by its error."""
     more = 1.0 + PERTURBATION
     return {
-        "mass": (a.mass_share, replace(a, mass_kg=a.mass_kg * more), at),
-        "Ixx": (a.inertia_share, replace(a, ixx_kgm2=a.ixx_kgm2 * more), at),
-        "Iyy": (a.inertia_share, replace(a, iyy_kgm2=a.iyy_kgm2 * more), at),
-        "Izz": (a.inertia_share, replace(a, izz_kgm2=a.izz_kgm2 * more), at),
+        "mass_share": (a.mass_share, replace(a, mass_kg=a.mass_kg * more), at),
+        "ixx_share": (a.inertia_share, replace(a, ixx_kgm2=a.ixx_kgm2 * more), at),
+        "iyy_share": (a.inertia_share, replace(a, iyy_kgm2=a.iyy_kgm2 * more), at),
+        "izz_share": (a.inertia_share, replace(a, izz_kgm2=a.izz_kgm2 * more), at),
     }
 
 

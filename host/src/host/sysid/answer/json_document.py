@@ -167,6 +167,7 @@ def answer_document(answer: Answer, lines: Sequence[str], verdict: Verdict) -> d
         "at_bound": list(answer.at_bound),
         "unpredicted": list(unpredicted_states(answer)),
         "corrections": correction_document(answer.corrections),
+        "errors": [error.document() for error in answer.errors],
         "refused": _flag_document(answer),
         "coefficients": _converted_document(answer, verdict),
         "modes": mode_document(answer.modes),
@@ -283,6 +284,7 @@ def coefficient_document(answer: CoefficientAnswer, verdict: Verdict) -> dict[st
         "instrument_errors": {
             n: {"value": v, "standard_deviation": d} for n, (v, d) in answer.fit.errors.items()
         },
+        "errors": [error.document() for error in answer.fit.error_sources],
         "fit": {"one_step": {n: {"nrmse": x.nrmse} for n, x in answer.fit.histories.items()}},
         "unseen": _prediction_document(answer.fit.prediction),
         "repeats": _repeats_document(answer.fit.maneuver_agreement),

@@ -18,6 +18,7 @@ from host.arrays import Array
 from host.constants import NORMAL_95
 from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
+from host.instrument.error_list import by_cause
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.coefficients.coefficient_fit import METHOD, CoefficientFit
 from host.sysid.coefficients.coefficient_intervals import (
@@ -38,7 +39,6 @@ from host.sysid.coefficients.flight_terms import flight_terms
 from host.sysid.coefficients.hidden_lag import lagging_equations
 from host.sysid.coefficients.pooled_flights import pool_fits
 from host.sysid.coefficients.window_spectra import SHORTEST_S, ResidualSpectra, Window
-from host.sysid.errors.error_list import by_cause
 from host.sysid.flight.reconstructed_flight import (
     ReconstructedFlight,
     maneuver_name,

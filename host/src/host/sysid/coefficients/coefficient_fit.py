@@ -9,6 +9,7 @@ import numpy as np
 
 from host.arrays import Array, IntArray
 from host.constants import NORMAL_95
+from host.instrument.error_sources import ErrorSource
 from host.sysid.coefficients.deletion_diagnostics import CrossValidation
 from host.sysid.numerics.maneuver_agreement import ManeuverAgreement
 
@@ -128,8 +129,8 @@ class CoefficientFit:
         Of single maneuvers by all others, in the last step.
     maneuver_agreement : ManeuverAgreement
         Scatter of the maneuvers about the joint estimate, in the last step.
-    error_deviations : dict
-        Standard deviation of each sensor error before the flight; empty of several flights.
+    error_sources : tuple of ErrorSource
+        Each sensor error before the flight; empty of several flights.
     error_shifts : dict of str to (derivatives,) Array
         Of the derivatives by one standard deviation of each error of sensors and of the drawing;
         empty of several flights. Noise is not in it, as it is in `covariance`.
@@ -142,7 +143,7 @@ class CoefficientFit:
     histories: dict[str, CoefficientHistory]
     prediction: CrossValidation | None
     maneuver_agreement: ManeuverAgreement
-    error_deviations: dict[str, float] = field(default_factory=dict)
+    error_sources: tuple[ErrorSource, ...] = ()
     error_shifts: dict[str, Array] = field(default_factory=dict)
 
 

@@ -227,7 +227,7 @@ def coefficient_fit(
         histories=_histories(problem, data, widths.state),
         prediction=predicted,
         maneuver_agreement=widths.maneuver_agreement,
-        error_deviations={source.name: source.deviation for source in problem.sources},
+        error_sources=problem.sources,
         error_shifts=widths.error_shifts,
     )
 

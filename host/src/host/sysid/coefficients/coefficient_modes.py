@@ -17,6 +17,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2, NORMAL_95
+from host.instrument.error_list import MASS, QBAR, error_kinds
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
 from host.sysid.conversion.derivative_conversion import Quantities
 from host.sysid.models.modal_analysis import Mode, eigenmodes, lateral_names, longitudinal_names
@@ -30,11 +31,6 @@ LINEAR_MOTION = (
     *(f"{row}_{k}" for row in ("CL", "CD", "Cm") for k in ("alpha", "q", "de", "V")),
     *(f"{row}_{k}" for row in ("CY", "Cl", "Cn") for k in ("beta", "p", "r", "da", "dr")),
 )
-
-CONVERSION_ERRORS = (
-    "mass_share", "ixx_share", "iyy_share", "izz_share",
-    "pitot_scale", "pitot_drift_pa", "density_share",
-)  # fmt: skip
 
 
 def coefficient_modes(fit: CoefficientFit, airframe: AirframeData) -> tuple[Mode, ...]:
@@ -96,7 +92,8 @@ def quantities(fit: CoefficientFit) -> Quantities:
     scales do not enter the conversion.
     """
     table = {d.name: d.value for d in fit.derivatives} | {n: e for n, (e, _) in fit.errors.items()}
-    names = [n for n in table if n in LINEAR_MOTION or n in CONVERSION_ERRORS]
+    errors = [n for n, k in error_kinds().items() if k.change == MASS or k.conversion == QBAR]
+    names = [n for n in table if n in LINEAR_MOTION or n in errors]
     at = [list(table).index(n) for n in names]
     values = np.array([table[n] for n in names])
     return Quantities(tuple(names), values, fit.covariance[np.ix_(at, at)])
@@ -210,7 +207,7 @@ def _speed_and_force(
     v: Mapping[str, float], fit: CoefficientFit, a: AirframeData, airspeed_ratio: float
 ) -> tuple[float, float]:
     """Return airspeed and dynamic pressure times wing area, corrected for pitot and density."""
-    qbar_pa = (fit.condition.qbar_pa - v["pitot_drift_pa"]) / (1.0 + v["pitot_scale"])
+    qbar_pa = (fit.condition.qbar_pa - v["pitot_zero_pa"]) / (1.0 + v["pitot_scale"])
     share = qbar_pa / fit.condition.qbar_pa / (1.0 + v["density_share"])
     return (
         fit.condition.airspeed_mps * airspeed_ratio * share**0.5,

@@ -16,6 +16,7 @@ from host.aircraft.powerplant import Powerplant
 from host.arrays import Array, IntArray
 from host.constants import GRAVITY_MPS2
 from host.instrument.deviations import SensorErrorModel
+from host.instrument.error_sources import ErrorSource
 from host.sysid.coefficients.aero_equations import KINEMATIC, Equation, FlightHistory, equations
 from host.sysid.coefficients.slow_gusts import LENGTH_M
 from host.sysid.coefficients.window_spectra import (
@@ -25,7 +26,6 @@ from host.sysid.coefficients.window_spectra import (
     equation_spectra,
     window_transform,
 )
-from host.sysid.errors.error_list import ErrorSource
 from host.sysid.models.coefficient_model import CoefficientModel
 from host.sysid.reconstruction.inverse_sensor_model import (
     Record,

@@ -20,6 +20,8 @@ from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel
+from host.instrument.error_list import CONSIDERED, error_kinds
+from host.instrument.error_sources import errors_by_file
 from host.sysid.coefficients.auxiliary_model import simulate_noise_free
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
 from host.sysid.coefficients.coefficient_intervals import (
@@ -49,7 +51,6 @@ from host.sysid.coefficients.normal_equations import Prior, solve_normal_equatio
 from host.sysid.coefficients.slow_gusts import gust_information, gust_regressors, gust_strength
 from host.sysid.coefficients.trim_derivatives import DerivativesAtTrim
 from host.sysid.coefficients.window_spectra import ResidualSpectra, Window, residual_spectra
-from host.sysid.errors.error_list import CONSIDERED, error_kinds, errors_by_file
 from host.sysid.models.coefficient_model import CoefficientModel, standard_model
 from host.sysid.reconstruction.inverse_sensor_model import decimate, usable_length
 

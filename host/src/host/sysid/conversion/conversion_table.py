@@ -21,10 +21,9 @@ from host.errors import IdentificationError
 from host.files.quantities import Quantity
 from host.files.user_text import shown
 from host.instrument.deviations import sensor_error_model
-from host.instrument.error_labels import ERROR_LABELS
+from host.instrument.error_list import conversion_errors, error_label
 from host.sysid.conversion.derivative_conversion import (
     COEFFICIENTS,
-    CONSIDERED_ERRORS,
     DERIVATIVES,
     ConversionPoint,
     Quantities,
@@ -86,12 +85,12 @@ class Conversion:
         own = self.found.deviation(name) ** 2
         k = self.found.names.index(name)
         shares = {}
-        for error in CONSIDERED_ERRORS:
+        for error in conversion_errors():
             j = self.found.names.index(error)
             part = self.found.covariance[k, j] ** 2 / max(self.found.covariance[j, j], 1e-300)
             shares[error] = part / max(own, 1e-300)
         cause = max(shares, key=shares.__getitem__)
-        return ERROR_LABELS[cause] if shares[cause] >= NAMED_SHARE else ""
+        return error_label(cause) if shares[cause] >= NAMED_SHARE else ""
 
 
 def convert(path: Path, aircraft: str, at: FlightCondition) -> Conversion:
@@ -246,6 +245,6 @@ def conversion_document(done: Conversion) -> dict[str, Any]:
             }
             for n in (OTHER[name] for name in done.given.names)
         },
-        "standard_deviations": {n: done.found.deviation(n) for n in CONSIDERED_ERRORS},
+        "standard_deviations": {n: done.found.deviation(n) for n in conversion_errors()},
         "left_out": list(done.left_out),
     }

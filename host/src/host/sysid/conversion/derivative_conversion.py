@@ -27,12 +27,8 @@ from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, deviations
+from host.instrument.error_list import conversion_errors
 
-CONSIDERED_ERRORS = (
-    "mass_share", "ixx_share", "iyy_share", "izz_share", "cg_x_m", "cg_z_m",
-    "pitot_scale", "pitot_drift_pa", "density_share", "alpha_scale", "beta_scale", "upwash_share",
-    "elevator_scale", "aileron_scale", "rudder_scale",
-)  # fmt: skip
 SENSOR_SCALES = {
     "alpha": "alpha_scale", "beta": "beta_scale", "de": "elevator_scale", "da": "aileron_scale",
     "dr": "rudder_scale",
@@ -79,7 +75,7 @@ class ConversionPoint:
 def consider_deviations(airframe: AirframeData, instrument: SensorErrorModel) -> dict[str, float]:
     """Return one standard deviation of every consider parameter of a conversion, by name."""
     every = deviations(instrument, airframe)
-    return {name: every[name] for name in CONSIDERED_ERRORS}
+    return {name: every[name] for name in conversion_errors()}
 
 
 def to_coefficients(
@@ -90,7 +86,7 @@ def to_coefficients(
     Parameters
     ----------
     derivatives : Quantities
-        Under the names of the templates (Z_alpha, M_q, L_p ...), SI; names of `CONSIDERED_ERRORS`
+        Under the names of the templates (Z_alpha, M_q, L_p ...), SI; names of `conversion_errors()`
         among them are consider parameters, correlated with the others by the covariance. Other
         names are left out.
     point : ConversionPoint
@@ -111,7 +107,7 @@ def to_coefficients(
 
     def convert(values: Table) -> Table:
         own, scale = _true_point(point, values), _sensor_scale(point.airframe, values)
-        found = {n: v * scale(n) for n, v in values.items() if n not in CONSIDERED_ERRORS}
+        found = {n: v * scale(n) for n, v in values.items() if n not in conversion_errors()}
         table = from_dimensional(found, own.airframe, own.condition)
         result = {coefficient_name(n): table[coefficient_name(n)] for n in found}
         return _transfer_moments(result, own, values, sign=1.0)
@@ -139,7 +135,7 @@ def to_derivatives(
 
     def convert(values: Table) -> Table:
         own, scale = _true_point(point, values), _sensor_scale(point.airframe, values)
-        found = {n: v for n, v in values.items() if n not in CONSIDERED_ERRORS}
+        found = {n: v for n, v in values.items() if n not in conversion_errors()}
         found = _transfer_moments(found, own, values, sign=-1.0)
         gains = dimensional_gains(own.airframe, own.condition)
         result = {}
@@ -164,7 +160,7 @@ def _true_point(point: ConversionPoint, values: Table) -> ConversionPoint:
         },
     )
     scale, drift_pa, density = (
-        values.get(n, 0.0) for n in ("pitot_scale", "pitot_drift_pa", "density_share")
+        values.get(n, 0.0) for n in ("pitot_scale", "pitot_zero_pa", "density_share")
     )
     qbar_pa = (at.qbar_pa - drift_pa) / (1.0 + scale)
     share = float(np.sqrt(qbar_pa / at.qbar_pa / (1.0 + density)))
@@ -215,13 +211,13 @@ def _converted(
     convert: Callable[[Table], Table],
 ) -> Quantities:
     """Return converted quantities and consider parameters with their joint covariance."""
-    unknown = sorted(set(errors) - set(CONSIDERED_ERRORS))
+    unknown = sorted(set(errors) - set(conversion_errors()))
     if unknown:
         raise IdentificationError(
-            f"unknown error {', '.join(unknown)}; known are {', '.join(CONSIDERED_ERRORS)}"
+            f"unknown error {', '.join(unknown)}; known are {', '.join(conversion_errors())}"
         )
-    kept = [k for k, n in enumerate(given.names) if n in known or n in CONSIDERED_ERRORS]
-    added = [n for n in CONSIDERED_ERRORS if n in errors and n not in given.names]
+    kept = [k for k, n in enumerate(given.names) if n in known or n in conversion_errors()]
+    added = [n for n in conversion_errors() if n in errors and n not in given.names]
     names = [given.names[k] for k in kept] + added
     if not set(known) & set(names):
         raise IdentificationError(
@@ -236,7 +232,7 @@ def _converted(
 
     def mapped(values: Array) -> Array:
         table = dict(zip(names, values.tolist(), strict=True))
-        own = {n: table[n] for n in names if n in CONSIDERED_ERRORS}
+        own = {n: table[n] for n in names if n in conversion_errors()}
         return np.array([*convert(table).values(), *own.values()])
 
     steps = STEP * np.sqrt(np.maximum(np.diag(covariance), (1e-2 * state) ** 2 + 1e-16))
@@ -248,5 +244,5 @@ def _converted(
         axis=1,
     )
     table = dict(zip(names, state.tolist(), strict=True))
-    converted = (*convert(table), *(n for n in names if n in CONSIDERED_ERRORS))
+    converted = (*convert(table), *(n for n in names if n in conversion_errors()))
     return Quantities(converted, mapped(state), slopes @ covariance @ slopes.T)

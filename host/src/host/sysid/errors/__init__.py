@@ -7,13 +7,6 @@ from host.faces import lazily
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from host.sysid.errors.error_list import (
-        ErrorSource,
-        by_cause,
-        error_kinds,
-        error_sources,
-        errors_by_file,
-    )
     from host.sysid.errors.systematic_errors import (
         add_systematic_covariance,
         systematic_error_shifts,
@@ -21,12 +14,7 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
-    "ErrorSource",
     "add_systematic_covariance",
-    "by_cause",
-    "error_kinds",
-    "error_sources",
-    "errors_by_file",
     "systematic_error_shifts",
     "systematic_residuals",
 ]
@@ -34,12 +22,7 @@ __all__ = [
 __getattr__ = lazily(
     __name__,
     {
-        "ErrorSource": "error_list",
         "add_systematic_covariance": "systematic_errors",
-        "by_cause": "error_list",
-        "error_kinds": "error_list",
-        "error_sources": "error_list",
-        "errors_by_file": "error_list",
         "systematic_error_shifts": "systematic_errors",
         "systematic_residuals": "systematic_errors",
     },

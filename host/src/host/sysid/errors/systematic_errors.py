@@ -15,8 +15,10 @@ import numpy as np
 
 from host.aircraft.mass_properties import Condition
 from host.arrays import Array
+from host.instrument.deviations import unknown_sensors
+from host.instrument.error_list import NOT_PAID
+from host.instrument.error_sources import ErrorSource, error_sources
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate, trim_of
-from host.sysid.errors.error_list import NOT_PAID, ErrorSource, error_sources
 from host.sysid.errors.one_step import one_step_of
 from host.sysid.estimators.gust_penetration import penetration_of, without_gust_penetration
 from host.sysid.models.consider_covariance import consider_covariance
@@ -38,6 +40,7 @@ from host.sysid.reconstruction.sensor_corrections import (
 )
 from host.sysid.reconstruction.sensor_dynamics import perturb_columns, residual_errors
 
+RECONSTRUCTED = "reconstruction of this flight"  # that left less of an error than files state
 TRIMMING = ("airspeed_mps", "alpha_rad", "theta_rad", "qbar_pa", "density_kgpm3")
 
 
@@ -196,7 +199,8 @@ def errors_left_open(known: Compatibility, columns: Mapping[str, Array]) -> tupl
     """
     left = {e: sd for e, sd in residual_deviations(known).items() if e in INSTANTANEOUS_ERRORS}
     sizes = left | residual_errors(known, columns)
-    listed = error_sources(sizes, known.instrument)
+    informed = {f.name: RECONSTRUCTED for f in known.findings if f.data_informed}
+    listed = error_sources(sizes, known.instrument or unknown_sensors(), informed)
     return tuple(e for e in listed if e.deviation > 0.0 and e.kind.linear != NOT_PAID)
 
 

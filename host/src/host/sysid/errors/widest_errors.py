@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from host.instrument.error_labels import ERROR_LABELS
+from host.instrument.error_list import error_label
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
 from host.sysid.models.consider_covariance import dominant_error_source
 from host.sysid.models.fit_result import FitResult
@@ -36,7 +36,7 @@ def widest_errors(
     noise = np.diag(fit.covariance)
     parts = {NOISE: noise, BESIDE: np.maximum(np.diag(statistical.covariance) - noise, 0.0)}
     for shift in shifts:
-        label = ERROR_LABELS.get(shift.error, shift.error)
+        label = error_label(shift.error)
         moved = (shift.estimate - statistical.estimate) ** 2
         parts[label] = parts.get(label, np.zeros(len(noise))) + moved
     variance = total.variance

@@ -17,6 +17,7 @@ from host.sysid.models.residual_delays import STANDARD_DELAYS
 if TYPE_CHECKING:
     from host.aircraft.mass_properties import Condition
     from host.arrays import Array
+    from host.instrument.error_sources import ErrorSource
     from host.sysid.estimators.servo_parameters import ServoEstimate
     from host.sysid.flight.column_change import Record
     from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
@@ -66,6 +67,7 @@ class Answer:
     explained: dict[str, Prediction] = field(default_factory=dict)  # of outputs fitted, in gusts
     noise_covariance: Array | None = None  # of the estimate, without systematic errors
     coefficient_parts: CoefficientParts | None = None
+    errors: tuple[ErrorSource, ...] = ()  # that widen its intervals
     standard_delays: tuple[DelayGroup, ...] = STANDARD_DELAYS  # that its sensors may have
     thrust: ThrustColumn | None = None  # that was measured and changed, beside the model
     left_out: tuple[str, ...] = ()  # motion beside a reduced template that nothing accounts for

@@ -118,6 +118,7 @@ class LinearEstimator:
             modes=modes(result),
             coefficients=() if intervals.parts is None else coefficients(intervals.parts),
             coefficient_parts=intervals.parts,
+            errors=intervals.errors,
             constant_inputs=constant_inputs(found.model, found.maneuvers),
             delays=found.delays,
             servo=estimate.columns.servo,

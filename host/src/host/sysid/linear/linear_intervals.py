@@ -9,7 +9,8 @@ import numpy as np
 
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
-from host.instrument.deviations import airspeed_share
+from host.instrument.deviations import airspeed_share, dynamic_pressure_share, unknown_sensors
+from host.instrument.error_sources import AIRCRAFT_FILE, ErrorSource, error_sources
 from host.instrument.instrument_errors import usual_errors
 from host.sysid.aerodynamics.coefficient_table import (
     CoefficientParts,
@@ -17,12 +18,13 @@ from host.sysid.aerodynamics.coefficient_table import (
     coefficient_parts,
 )
 from host.sysid.aerodynamics.path_thrust import path_thrust
-from host.sysid.errors.airspeed_tolerance import airspeed_shift
+from host.sysid.errors.airspeed_tolerance import AIRSPEED, airspeed_shift
 from host.sysid.errors.column_noise import column_noise
 from host.sysid.errors.sampling_error import hold_shift
 from host.sysid.errors.surface_motion import kink_residuals, motion_shift, surfaces_known
 from host.sysid.errors.systematic_errors import (
     add_systematic_covariance,
+    errors_left_open,
     systematic_error_shifts,
     systematic_residuals,
 )
@@ -67,7 +69,12 @@ def linear_intervals(estimate: LinearEstimate, powerplant: Powerplant | None) ->
         thrust = path_thrust(e.columns.cuts, powerplant, airframe, e.trim, condition)
         found = coefficient_parts(statistical, airframe, condition, shifts, errors, thrust)
     return LinearIntervals(
-        statistical, coherence, shifts, add_systematic_covariance(statistical, shifts), found
+        statistical,
+        coherence,
+        shifts,
+        _error_sources(e, shifts, found),
+        add_systematic_covariance(statistical, shifts),
+        found,
     )
 
 
@@ -196,6 +203,35 @@ def _shifts(e: LinearEstimate, statistical: FitResult) -> tuple[ShiftedEstimate,
     )
 
 
+def _error_sources(
+    e: LinearEstimate, shifts: Sequence[ShiftedEstimate], parts: CoefficientParts | None
+) -> tuple[ErrorSource, ...]:
+    """Return the errors of the list that widen derivatives or coefficients."""
+    counted = {shift.error for shift in shifts}
+    found: dict[str, ErrorSource] = {}
+    for known, cut in zip(_carriers(e), e.columns.cuts, strict=True):
+        for one in () if known is None else errors_left_open(known, cut):
+            if one.name in counted and one.deviation > getattr(found.get(one.name), "deviation", 0):
+                found[one.name] = one
+    instrument = e.columns.used[0].flight.instrument or unknown_sensors()
+    sizes = {AIRSPEED: _airspeed_share(e)} if AIRSPEED in counted else {}
+    stated: dict[str, float] = {}
+    if parts is not None and (a := e.columns.airframe) is not None:
+        pitots = dynamic_pressure_share(instrument.errors, e.columns.chosen.condition.qbar_pa)
+        sizes |= {"pitot_scale": pitots} if "pitot_scale" in parts.assumed else {}
+        stated = dict.fromkeys(("ixx_share", "iyy_share", "izz_share"), a.inertia_share)
+        stated |= {"mass_share": a.mass_share, "upwash_share": a.upwash_share}
+    origins = dict.fromkeys(stated, AIRCRAFT_FILE)
+    return (*found.values(), *error_sources(sizes | stated, instrument, origins))
+
+
+def _airspeed_share(e: LinearEstimate) -> float:
+    """Return one deviation of the scale of an airspeed that nobody calibrated."""
+    first = e.columns.used[0].flight
+    usual = first.errors or usual_errors(first.maker)
+    return airspeed_share(usual, e.columns.chosen.condition.qbar_pa)
+
+
 def _by_sensors(
     e: LinearEstimate, statistical: FitResult, fitted: Sequence[Maneuver]
 ) -> tuple[ShiftedEstimate, ...]:
@@ -218,10 +254,7 @@ def _by_airspeed(
     """Return what an airspeed does that nobody calibrated."""
     if e.columns.airframe is not None:
         return ()
-    first = e.columns.used[0].flight
-    usual = first.errors or usual_errors(first.maker)
-    share = airspeed_share(usual, e.columns.chosen.condition.qbar_pa)
-    return airspeed_shift(statistical, fitted, e.trim, share)
+    return airspeed_shift(statistical, fitted, e.trim, _airspeed_share(e))
 
 
 def _by_motion(

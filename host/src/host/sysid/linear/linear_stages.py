@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from host.arrays import Array
+from host.instrument.error_sources import ErrorSource
 from host.sysid.aerodynamics.coefficient_table import CoefficientParts, ShiftedEstimate
 from host.sysid.aerodynamics.thrust_terms import THRUST_BESIDE
 from host.sysid.errors.departure import Departure
@@ -135,6 +136,8 @@ class LinearIntervals:
         What the inputs drive beside the model.
     shifts : tuple of ShiftedEstimate
         The estimate moved by each systematic error.
+    errors : tuple of ErrorSource
+        Errors that widen intervals; of several flights the largest deviation of each.
     total : Uncertainty
         Of the estimate with all of these.
     parts : CoefficientParts or None
@@ -144,6 +147,7 @@ class LinearIntervals:
     statistical: FitResult
     coherence: InputCoherence | None
     shifts: tuple[ShiftedEstimate, ...]
+    errors: tuple[ErrorSource, ...]
     total: Uncertainty
     parts: CoefficientParts | None
 

@@ -11,7 +11,7 @@ import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, unknown_sensors
-from host.instrument.error_labels import recording_notes
+from host.instrument.recording_notes import recording_notes
 from host.instrument.servo_prior import servo_prior
 from host.physical.calibration import load_calibration
 from host.sysid.aerodynamics.measured_thrust import with_thrust

@@ -23,10 +23,10 @@ from host.sysid.reconstruction.strapdown import (
 
 # Errors of the inertial sensors, in the order of their slopes.
 INERTIAL = (
-    *(f"gyro_bias_{a}_radps" for a in "xyz"),
-    *(f"gyro_scale_{a}" for a in "xyz"),
-    *(f"accel_bias_{a}_mps2" for a in "xyz"),
-    *(f"accel_scale_{a}" for a in "xyz"),
+    *(f"gyro_{a}_bias_radps" for a in "xyz"),
+    *(f"gyro_{a}_scale" for a in "xyz"),
+    *(f"accel_{a}_bias_mps2" for a in "xyz"),
+    *(f"accel_{a}_scale" for a in "xyz"),
     *(f"imu_tilt_{a}_rad" for a in "xyz"),
 )
 FLOW = ("alpha_scale", "alpha_zero_rad", "beta_scale", "beta_zero_rad")

@@ -18,7 +18,7 @@ from host.arrays import Array
 from host.constants import GRAVITY_MPS2, NORMAL_95
 from host.sysid.reconstruction.reconstruction import POSTERIOR_PRIOR_RATIO, Compatibility
 
-TILT, BIAS = "imu_tilt_y_rad", "accel_bias_x_mps2"
+TILT, BIAS = "imu_tilt_y_rad", "accel_x_bias_mps2"
 LEAST_S = 0.5  # of a standstill; our own log may begin a second before the launch
 STILL_RADPS, STILL_MPS2 = 0.03, 0.5  # motion about its mean: a hand's is ten times that
 GRAVITY_SHARE = 0.05  # specific force within this of gravity's

@@ -169,10 +169,10 @@ def apply_sensor_errors(
     e = errors
     pitot = e["pitot_delay_s"], data.pitot_lag_s
     pressure = record.cached("qbar_pa", pitot, lambda: _invert_lag(record, "qbar_pa", *pitot))
-    qbar = (pressure - e["pitot_drift_pa"]) / (1.0 + e["pitot_scale"])
+    qbar = (pressure - e["pitot_zero_pa"]) / (1.0 + e["pitot_scale"])
     density = record.columns["density_kgpm3"] * (1.0 + e["density_share"])
     V = np.sqrt(2.0 * np.maximum(qbar, 1.0) / density)
-    tilt = [e[f"tilt_{a}_rad"] for a in "xyz"]
+    tilt = [e[f"imu_tilt_{a}_rad"] for a in "xyz"]
     alignment = np.linalg.inv(
         [[1.0, tilt[2], -tilt[1]], [-tilt[2], 1.0, tilt[0]], [tilt[1], -tilt[0], 1.0]]
     )

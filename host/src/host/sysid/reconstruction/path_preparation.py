@@ -150,7 +150,7 @@ def prior(
     e, sd = i.errors, deviations(i, NO_OFFSETS)
     kinds = (
         *("gyro_{}_bias_radps", "gyro_{}_scale", "accel_{}_bias_mps2", "accel_{}_scale"),
-        "tilt_{}_rad",
+        "imu_tilt_{}_rad",
     )
     alike = [sd[kind.format(axis)] for kind in kinds for axis in "xyz"]
     result = {name: (0.0, own) for name, own in zip(INERTIAL, alike, strict=True)}
@@ -160,7 +160,7 @@ def prior(
         "beta_scale": sd["beta_scale"],
         "beta_zero_rad": e["vane_zero_rad"].of_mean("beta_a", "beta_b"),
         "pitot_scale": float(np.hypot(sd["pitot_scale"], density_share(i))),
-        "pitot_zero_pa": sd["pitot_drift_pa"],
+        "pitot_zero_pa": sd["pitot_zero_pa"],
     }
     result |= {name: (0.0, known[name]) for name in (*FLOW, *PITOT)}
     pitot = (i.pitot_lag_s, max(i.pitot_lag_s, sd["pitot_delay_s"]))

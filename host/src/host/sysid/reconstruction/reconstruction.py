@@ -252,7 +252,7 @@ def _beside_imu(
     priors : mapping
         Mean and deviation of every error.
     """
-    bias, tilt = priors["accel_bias_x_mps2"][1] / GRAVITY_MPS2, priors["imu_tilt_y_rad"][1]
+    bias, tilt = priors["accel_x_bias_mps2"][1] / GRAVITY_MPS2, priors["imu_tilt_y_rad"][1]
     by_data = estimate[1] ** -2 - sd**-2
     looks_alike = 1.0 + by_data * (bias**2 + tilt**2)
     left = 1.0 / (by_data / looks_alike + sd**-2)

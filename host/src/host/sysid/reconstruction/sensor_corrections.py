@@ -125,8 +125,8 @@ def correct_columns(
     at = errors.get
     tilt = np.array([at(f"imu_tilt_{a}_rad", 0.0) for a in "xyz"])
     for names, offset, gain in (
-        (RATES, "gyro_bias_{}_radps", "gyro_scale_{}"),
-        (FORCES, "accel_bias_{}_mps2", "accel_scale_{}"),
+        (RATES, "gyro_{}_bias_radps", "gyro_{}_scale"),
+        (FORCES, "accel_{}_bias_mps2", "accel_{}_scale"),
     ):
         own = [pattern.format(a) for pattern in (offset, gain) for a in "xyz"]
         unmoved = not (tilt.any() or any(at(name) for name in own))

@@ -1,21 +1,25 @@
 """One list of errors: each is paid by whom it says, and changes what it says."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from host.aircraft.mass_properties import airframe_data
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
-from host.instrument.error_sources import AIRCRAFT_FILE, FLIGHT, INSTRUMENT
-from host.physical.recording import SURFACES, Recording
-from host.sysid.errors import (
+from host.instrument.error_list import by_cause, error_kinds
+from host.instrument.error_sources import (
+    AIRCRAFT_FILE,
+    FLIGHT,
+    INSTRUMENT,
     ErrorSource,
-    by_cause,
-    error_kinds,
     error_sources,
     errors_by_file,
 )
+from host.physical.calibration import load_calibration
+from host.physical.recording import SURFACES, Recording
+from host.resources import resource
 from host.sysid.reconstruction.inverse_sensor_model import Record, apply_sensor_errors
 from host.sysid.reconstruction.sensor_corrections import INSTANTANEOUS_ERRORS
 from host.sysid.reconstruction.sensor_dynamics import DELAYED_COLUMNS, PLACES, POTS, SERVOS
@@ -76,14 +80,33 @@ def test_every_error_that_an_estimator_meets_is_in_the_list_and_paid() -> None:
     assert {n for n, k in kinds.items() if k.coefficients in ("considered", "estimated")} == met
     assert not [n for n, k in kinds.items() if k.linear == k.coefficients == "not paid"]
     with pytest.raises(KeyError, match="wing_wetness"):
-        error_sources({"wing_wetness": 0.1}, None)
+        error_sources({"wing_wetness": 0.1}, instrument(commanded=False))
 
 
 def test_an_error_belongs_to_what_stated_it() -> None:
-    origin = {source.name: source.origin for source in by_file(commanded=False)}
-    assert {origin[n] for n in ("mass_share", "cg_x_m", "imu_x_m")} == {AIRCRAFT_FILE}
-    assert origin["pitot_scale"] == INSTRUMENT
-    assert origin["pitot_drift_pa"] == FLIGHT
+    owner = {source.name: source.belongs_to for source in by_file(commanded=False)}
+    assert {owner[n] for n in ("mass_share", "cg_x_m", "imu_x_m")} == {AIRCRAFT_FILE}
+    assert owner["pitot_scale"] == INSTRUMENT
+    assert owner["pitot_zero_pa"] == FLIGHT
+
+
+def test_every_deviation_says_where_it_comes_from(tmp_path: Path) -> None:
+    """One vane was calibrated, the other was not; a table states the thrust."""
+    text = resource("default.toml").read_text(encoding="utf-8")
+    measured = text.replace("[channel.alpha_a]", "[channel.alpha_a]\ndefault = false")
+    thrust = '\n[error.thrust_share]\nsigma = 0.01\nsource = "thrust stand"\n'
+    path = tmp_path / "own.toml"
+    path.write_text(measured + thrust, encoding="utf-8")
+    sensors = sensor_error_model(NAME, load_calibration(path))
+    found_errors = errors_by_file(sensors, airframe_data(NAME), {"pitot_scale": 0.5})
+    origin = {source.name: source.origin for source in found_errors}
+    assert origin["thrust_share"] == "calibration file"
+    assert origin["mass_share"] == origin["cg_x_m"] == origin["upwash_share"] == "aircraft file"
+    assert origin["gyro_x_scale"].startswith("default: left after hw/calibration")
+    assert origin["alpha_scale"].startswith("calibration file, default: ")
+    assert origin["beta_scale"].startswith("default: encoder linearity")
+    assert origin["pitot_scale"] == "assumed of this flight"
+    assert origin["density_share"].startswith("default: barometer")
 
 
 def test_a_larger_assumption_replaces_the_size_of_the_file_and_a_smaller_does_not() -> None:
@@ -95,8 +118,8 @@ def test_a_larger_assumption_replaces_the_size_of_the_file_and_a_smaller_does_no
 
 
 def test_errors_that_no_flight_tells_apart_have_one_cause() -> None:
-    found = by_cause(["tilt_y_rad", "alpha_zero_rad", "imu_x_m", "cg_x_m", "gyro_x_scale"])
+    found = by_cause(["imu_tilt_y_rad", "alpha_zero_rad", "imu_x_m", "cg_x_m", "gyro_x_scale"])
     assert found == {
         "place of CG and IMU along x": ("cg_x_m", "imu_x_m"),
-        "IMU tilt and vane zero about y": ("tilt_y_rad", "alpha_zero_rad"),
+        "IMU tilt and vane zero about y": ("imu_tilt_y_rad", "alpha_zero_rad"),
     }
