@@ -142,7 +142,7 @@ def coefficient_parts(
         assumed["pitot_scale"] = -value * dynamic_pressure_share(
             errors or standard_errors(), condition.qbar_pa
         )
-    # An angle that is told by accelerations saw no vane, and no upwash.
+    # An angle that accelerations determine saw no vane, and no upwash.
     seen = [f"_{y.removesuffix('_rad')}" for y in ANGLES if y in result.model.outputs]
     of_flow_angle = np.array([name.endswith(tuple(seen)) for name in names])
     assumed["upwash_share"] = np.asarray(

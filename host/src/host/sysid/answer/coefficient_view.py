@@ -50,7 +50,7 @@ LEANING: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 
 @dataclass(frozen=True)
 class CoefficientView:
-    """What rules and verdict read of coefficients fitted directly (`EstimateView`)."""
+    """View of coefficients fitted directly, as rules and verdict read them (`EstimateView`)."""
 
     answer: CoefficientAnswer
 
@@ -146,7 +146,7 @@ class CoefficientView:
 
 
 def lag_beside(answer: CoefficientAnswer) -> list[Doubt]:
-    """Surfaces seem to lag behind their columns, and that moves a moment beyond its intervals."""
+    """Doubt a moment that a lag of surfaces moves beyond its intervals."""
     names = [d.name for d in answer.fit.derivatives]
     return [
         one

@@ -21,7 +21,7 @@ class Doubt:
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What beside an answer speaks against it.
+    """Evidence against an answer from outside of it.
 
     Attributes
     ----------

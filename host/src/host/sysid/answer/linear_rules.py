@@ -34,7 +34,7 @@ NEAR_BOUND = 1e-6  # of a bound's distance to the start, or of its size
 
 
 def driven_by_inputs(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """The inputs drive more of what the fit leaves than widening can answer for, and not little."""
+    """Doubt outputs of which inputs drive more than widening can answer for."""
     if answer.coherence is None:
         return []
     left, shares = {f.name: f.nrmse for f in answer.fits}, answer.coherence.driven_shares()
@@ -50,7 +50,7 @@ def driven_by_inputs(answer: Answer, evidence: Evidence) -> list[Doubt]:
 
 
 def delay_at_bound(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """A delay at its bound is what a model lacks in that signal."""
+    """Doubt signals whose delay is at its bound: the model lacks something there."""
     groups = [g for g in (*STANDARD_DELAYS, *answer.model.delays) if g.name in answer.at_bound]
     return [
         one
@@ -60,7 +60,7 @@ def delay_at_bound(answer: Answer, evidence: Evidence) -> list[Doubt]:
 
 
 def on_a_bound(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """The search wanted a value beyond what was allowed."""
+    """Doubt a value at the bound of the search."""
     half = answer.result.half_width()
     names = [
         p.name
@@ -72,7 +72,7 @@ def on_a_bound(answer: Answer, evidence: Evidence) -> list[Doubt]:
 
 
 def methods_disagree(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """Another method that is valid in this noise differs beyond the joint interval."""
+    """Doubt what another method, valid in this noise, contradicts beyond the joint interval."""
     return [
         one
         for name, reason in disagreements(answer, evidence.beside).items()
@@ -81,12 +81,12 @@ def methods_disagree(answer: Answer, evidence: Evidence) -> list[Doubt]:
 
 
 def one_input_for_two(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """Two inputs moved as one, and a regression left one of them out."""
+    """Doubt inputs that moved as one, of which a regression left one out."""
     return _named(answer, derivatives_of_both(answer), "of both inputs, one was left out")
 
 
 def motion_left_out(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """A reduced template was fitted without what other states do: short records do not show it."""
+    """Doubt a reduced template where short records hide what other states do."""
     if not answer.left_out:
         return []
     reason = f"what {' and '.join(answer.left_out)} does beside {answer.template} is in no interval"
@@ -94,7 +94,7 @@ def motion_left_out(answer: Answer, evidence: Evidence) -> list[Doubt]:
 
 
 def lag_unknown(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """A lag that nothing tells is under another name in what the commands do."""
+    """Doubt what commands do where nothing determines their lag."""
     why = unknown_lag(answer)
     reason = f"the lag behind the commands is not known ({why}): they cannot be told apart"
     return _named(answer, lag_lookalikes(answer), reason) if why else []

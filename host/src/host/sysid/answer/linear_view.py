@@ -62,7 +62,7 @@ RULES: tuple[Rule, ...] = (
 
 @dataclass(frozen=True)
 class LinearView:
-    """What rules and verdict read of a linear model (`EstimateView`)."""
+    """View of a linear model, as rules and verdict read it (`EstimateView`)."""
 
     answer: Answer
 

@@ -56,7 +56,7 @@ def mark_of(one: Judged, fair: float = FAIR) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What of one model may be relied on.
+    """Verdict on one model: what of it may be relied on.
 
     Attributes
     ----------

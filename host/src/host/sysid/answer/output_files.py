@@ -34,7 +34,7 @@ ENDINGS = {
 
 @dataclass(frozen=True, slots=True)
 class OutputPaths:
-    """Where the user wants files, and the aircraft that the answer is made with.
+    """Paths of the files that the user wants, and the aircraft that the answer is made with.
 
     Attributes
     ----------

@@ -27,7 +27,7 @@ def own(rule: Rule) -> Rule:
 
 
 def open_finding(view: EstimateView, evidence: Evidence) -> list[Doubt]:
-    """The data checks found something in that channel, and nothing has closed it."""
+    """Doubt what leans on a channel with an open finding."""
     return [
         one
         for channel, check in open_channels(evidence.findings).items()
@@ -38,7 +38,7 @@ def open_finding(view: EstimateView, evidence: Evidence) -> list[Doubt]:
 
 
 def input_feedback(view: EstimateView, evidence: Evidence) -> list[Doubt]:
-    """A surface is a function of states: in one equation their derivatives are alike."""
+    """Doubt derivatives that a feedback law makes alike in one equation."""
     return [
         one
         for law in feedback_of(evidence.findings)
@@ -51,17 +51,17 @@ def input_feedback(view: EstimateView, evidence: Evidence) -> list[Doubt]:
 
 
 def fit_fails(view: EstimateView, evidence: Evidence) -> list[Doubt]:
-    """The fitted data themselves are not explained, and not because a sensor is noisy."""
+    """Doubt what the fitted data contradict, unless a sensor is noisy."""
     return [one for names, why in view.failures() for one in doubt(names, view.names, why)]
 
 
 def not_predicted(view: EstimateView, evidence: Evidence) -> list[Doubt]:
-    """An unseen maneuver differs by more than what was fitted, noise and intervals allow."""
+    """Doubt what an unseen maneuver contradicts beyond fit, noise and intervals."""
     return [one for names, why in view.unpredicted() for one in doubt(names, view.names, why)]
 
 
 def impossible_sign(view: EstimateView, evidence: Evidence) -> list[Doubt]:
-    """A sign that no aircraft has; of a user's own model only the bounds speak."""
+    """Doubt a sign that no aircraft has; of a user's own model only the bounds speak."""
     return [
         one
         for name, reason in impossible_signs(view.values).items()

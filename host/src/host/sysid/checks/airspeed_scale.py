@@ -1,4 +1,4 @@
-"""Is the airspeed's scale within what its file claims? Forces and turning wind angles tell it.
+"""Test the airspeed's scale against its file by forces and turning wind angles.
 
 A force along an axis turns the wind angle by itself over the airspeed: an airspeed that reads 10 %
 high makes the force count 10 % too little. `driven_motion` tells the factor by what surfaces drive:
@@ -42,7 +42,7 @@ TRIED = np.linspace(0.6, 1.6, 101)
 
 @dataclass(frozen=True, slots=True)
 class AirspeedScale:
-    """How many times the airspeed it reads, and how unlikely that makes what the file claims.
+    """Ratio of the airspeed read to the true one, and how unlikely that makes what the file claims.
 
     Attributes
     ----------

@@ -101,7 +101,7 @@ class Finding:
     flight : str
         Its source, where there are several.
     feedback : Feedback or None
-        Whose derivatives cannot be told apart.
+        Whose derivatives cannot be separated.
     """
 
     check: str

@@ -27,7 +27,7 @@ SENSOR_SHARE, SENSOR_DELAY_S = 0.1, 0.03  # scale, delay and place of right sens
 UNKNOWN_SHARE = 0.1  # of a motion, that they make of it in other ways
 SHORTEST_S = 19.0  # of 20 with its ends: a trend of a shorter record is explained by chance
 CERTAIN = 9.0  # of a chi-square of one unknown: three deviations
-LIKELIER = 1.0  # of the same, one deviation: below it nothing is told of two units
+LIKELIER = 1.0  # of the same, one deviation: below it two units are alike
 CERTAIN_P = 0.0027  # the same, as what chance exceeds
 RIGHT = (1.0 / LARGEST_FACTOR, 1.0, LARGEST_FACTOR)
 TRIED = tuple(10.0 ** (0.1 * k) for k in range(-20, 21))
@@ -35,7 +35,7 @@ TRIED = tuple(10.0 ** (0.1 * k) for k in range(-20, 21))
 
 @dataclass(frozen=True, slots=True)
 class DrivenFactor:
-    """How many times as fast a column moves as another says, in what surfaces drive.
+    """Ratio of a column's motion to what another says, in what surfaces drive.
 
     It is certain not to be one: the likeliest value, and how far it leaves the identity broken.
     """
@@ -224,8 +224,8 @@ def likelier_factor(
         for f in (1.0, *tried)
     }
     slope = min(broken, key=broken.__getitem__)
-    told = LIKELIER * (2.0 if unlikely else 1.0)  # what is usual is a second measure
-    return slope if broken[1.0] - broken[slope] > told else None
+    least = LIKELIER * (2.0 if unlikely else 1.0)  # what is usual is a second measure
+    return slope if broken[1.0] - broken[slope] > least else None
 
 
 def testable(law: Identity) -> bool:

@@ -49,7 +49,7 @@ LABEL = {
     "alpha_rad": "alpha", "beta_rad": "beta", "p_radps": "p", "q_radps": "q", "r_radps": "r",
 }  # fmt: skip
 CAUSES = {"rudder_rad": ("a yaw damper", "an autopilot"), "": ("an autopilot", "a stabiliser")}
-LEAST_LAG_S = 0.05  # a shorter one cannot be told from a delay
+LEAST_LAG_S = 0.05  # a shorter one looks like a delay
 
 
 def feedback_findings(

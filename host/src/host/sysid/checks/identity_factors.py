@@ -21,7 +21,7 @@ RIGHT_SHARE = 0.1  # of a motion, that scales of right sensors make of it
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """How fast one column changes, and what of it each other column must account for.
+    """Rate of one column, and what of it each other column must account for.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class Factor:
-    """How many times as fast a column moves as another says: the range that noise leaves."""
+    """Ratio of a column's motion to what another says: the range that noise leaves."""
 
     law: Identity
     name: str

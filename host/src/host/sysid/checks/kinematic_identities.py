@@ -51,7 +51,7 @@ def block_means(flown: Mapping[str, Array], block: int) -> dict[str, Array]:
 
 
 def _fast(m: Mapping[str, Array]) -> Iterator[Identity]:
-    """Attitude and wind angles."""
+    """Return the identities of attitude and wind angles."""
     zero = np.zeros(len(m["t_s"]))
     phi, theta = m.get("phi_rad", zero), m.get("theta_rad", zero)
     alpha, beta = m.get("alpha_rad", zero), m.get("beta_rad", zero)
@@ -139,7 +139,7 @@ def _lift_and_weight(m: Mapping[str, Array], alpha: Array, phi: Array) -> tuple[
 
 
 def _slow(m: Mapping[str, Array]) -> Iterator[Identity]:
-    """Speed and height."""
+    """Return the identities of speed and height."""
     if all(f"a{k}_mps2" in m for k in "xz") and "theta_rad" in m and "airspeed_mps" in m:
         zero = np.zeros(len(m["t_s"]))
         theta, phi = m["theta_rad"], m.get("phi_rad", zero)
@@ -175,7 +175,7 @@ def _slow(m: Mapping[str, Array]) -> Iterator[Identity]:
 def _shear(law: Identity) -> float:
     """Return the likeliest change of head wind with height, 1/s, beside any factor of the force.
 
-    It is what stands beside the only part of the identity, within what shear usually is: a force
+    It is the rest beside the only part of the identity, within what shear usually is: a force
     that is turned round stays one.
     """
     (part,), (climb,) = law.parts.values(), law.beside

@@ -92,7 +92,7 @@ def _angles(flown: Mapping[str, Array]) -> list[Finding]:
 
 
 def _surface_sizes(flown: Mapping[str, Array]) -> list[Finding]:
-    """Look at the ends of surfaces: at rest for most of a flight, no quantile shows their unit."""
+    """Check the unit of surfaces by their ends: at rest most of the time, no quantile shows it."""
     findings = []
     for name in SURFACES:
         if name not in flown:
@@ -109,7 +109,7 @@ def _surface_sizes(flown: Mapping[str, Array]) -> list[Finding]:
 
 
 def _gravity(flown: Mapping[str, Array]) -> list[Finding]:
-    """Hold specific force against weight: in level flight it is as large and points up."""
+    """Compare specific force with weight: in level flight it is as large and points up."""
     names = tuple(k for k in ("ax_mps2", "ay_mps2", "az_mps2") if k in flown)
     if "az_mps2" not in names:
         return []
@@ -160,7 +160,7 @@ def _air(flown: Mapping[str, Array]) -> list[Finding]:
 
 
 def _forces(means: Mapping[str, Array]) -> list[Finding]:
-    """Hold the wind angles against the forces they make."""
+    """Compare wind angles with the forces they make."""
     findings = []
     for check, angle, force in (
         ("alpha-against-az", "alpha_rad", "az_mps2"),

@@ -26,7 +26,7 @@ KINEMATIC = ("u", "v", "w")
 
 @dataclass(frozen=True, slots=True)
 class FlightHistory:
-    """What belongs to one flight beside the corrected signals, each (n,) unless stated.
+    """Columns of one flight besides the corrected signals, each (n,) unless stated.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Equation:
 
 @dataclass(frozen=True, slots=True)
 class Equations:
-    """All equations of a flight at the same samples.
+    """Equations of a flight, all at the same samples.
 
     Attributes
     ----------

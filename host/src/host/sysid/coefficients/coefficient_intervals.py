@@ -55,7 +55,7 @@ MOVED_BY_AIR = ("Cm_alpha", "Cm_q", "Cl_p", "Cl_da", "Cn_beta", "Cn_r")
 
 @dataclass(frozen=True)
 class SearchResult:
-    """Where the search ended.
+    """Result of the search.
 
     Attributes
     ----------

@@ -67,7 +67,7 @@ def known_axes(fit: CoefficientFit) -> tuple[bool, bool]:
 
 @dataclass(frozen=True, slots=True)
 class LinearSystem:
-    """x' = A x + B u; every entry with its 95 % half-width.
+    """Linear system x' = A x + B u; every entry with its 95 % half-width.
 
     Attributes
     ----------

@@ -77,30 +77,30 @@ def flight_terms(
             "coefficients need a maneuver of the elevator, or one of aileron and rudder, for which"
             " the model has an equation"
         )
-    told = _Told(dict(columns), windows)
-    told.leave_axes_out(model)
-    told.fill_air()
-    told.leave_still_controls_out()
-    told.take_thrust(model, powerplant)
+    flown = _FlownTerms(dict(columns), windows)
+    flown.leave_axes_out(model)
+    flown.fill_air()
+    flown.leave_still_controls_out()
+    flown.take_thrust(model, powerplant)
     equations = {
-        name: tuple(t for t in terms if not {f[0] for f in t.factors} & set(told.still))
+        name: tuple(t for t in terms if not {f[0] for f in t.factors} & set(flown.still))
         for name, terms in model.equations.items()
-        if name not in told.lost
+        if name not in flown.lost
     }
     if not equations:
-        raise IdentificationError(f"coefficients: {'; '.join(told.remarks)}; no equation is left")
+        raise IdentificationError(f"coefficients: {'; '.join(flown.remarks)}; no equation is left")
     return FlightTerms(
         replace(model, equations=equations),
         windows,
-        told.columns,
-        tuple(told.remarks),
-        told.assumed,
+        flown.columns,
+        tuple(flown.remarks),
+        flown.assumed,
     )
 
 
 @dataclass(slots=True)
-class _Told:
-    """What a flight tells, each step with its remark.
+class _FlownTerms:
+    """Columns and terms that a flight determines; each step adds its remark.
 
     `lost` are equations, `still` the labels of surfaces that it says nothing of; `level` are the
     columns taken as in level flight.
@@ -171,13 +171,13 @@ class _Told:
         thrust = thrust_column(self.columns, powerplant)
         self.remarks += thrust.remarks
         drag = [n for n in model.equations if n in DRAG and n not in self.lost]
-        told = self.along and bool(drag)
-        if told and self.level:
+        has_drag = self.along and bool(drag)
+        if has_drag and self.level:
             self.lost += drag
             self.remarks.append(f"no ax_mps2: {', '.join(drag)} left out")
         elif not thrust.known:
             self.lost += drag
-            if told:
+            if has_drag:
                 self.remarks.append(
                     f"no thrust known: {', '.join(drag)} left out, the other coefficients hold what"
                     " thrust adds; give [propulsion] and throttle, thrust_n or power_w"

@@ -1,6 +1,6 @@
-"""Would surfaces that lag behind their columns move the coefficients of a moment?
+"""Test whether surfaces that lag behind their columns move the coefficients of a moment.
 
-The spectrum of the residual is what weighs it: a lag that nobody told makes it large where the lag
+The spectrum of the residual is what weighs it: an unknown lag makes it large where the lag
 acts, and passes for noise. With 50 ms of it Cm_alpha, Cm_de and Cl_p were 42 to 55 % off, known to
 4. To first order a lag is the slope of a surface, one more column beside the terms of an equation:
 how it moves them says whether it matters, a one-sided test whether it is there: a surface ahead of
@@ -44,18 +44,18 @@ def lagging_equations(
         By equation: how far at most, in half-widths.
     """
     half = {d.name: d.half_width for d in derivatives}
-    told = {d.name: d.value for d in derivatives if abs(d.value) > d.half_width}
+    known = {d.name: d.value for d in derivatives if abs(d.value) > d.half_width}
     found: dict[str, float] = {}
     for search in searches:
         for equation in MOMENTS:
-            shifts = _shifts(search, equation, told)
+            shifts = _shifts(search, equation, known)
             far = [abs(s) / half[n] for n, s in shifts.items() if half.get(n, 0.0) > 0.0]
             if max(far, default=0.0) > 1.0:
                 found[equation] = max(*far, found.get(equation, 0.0))
     return found
 
 
-def _shifts(search: SearchResult, equation: str, told: Mapping[str, float]) -> dict[str, float]:
+def _shifts(search: SearchResult, equation: str, known: Mapping[str, float]) -> dict[str, float]:
     """Return how each coefficient of an equation moves, if a surface that it tells lags."""
     labels = [term.label for _, of, term in search.problem.model.named() if of == equation]
     moved = [k for k, label in enumerate(labels) if label in SURFACES]
@@ -72,7 +72,7 @@ def _shifts(search: SearchResult, equation: str, told: Mapping[str, float]) -> d
     freedom = len(left) - wide.shape[1] - sum(b.trend_basis.shape[1] for b in blocks)
     noise = float(np.sum((left - wide @ beside) ** 2)) / max(freedom, 1)
     deviation = np.sqrt(noise * np.diag(covariance)[count:])
-    signs = np.sign([told.get(f"{equation}_{labels[k]}", 0.0) for k in moved])
+    signs = np.sign([known.get(f"{equation}_{labels[k]}", 0.0) for k in moved])
     if not _late(-signs * beside[count:], deviation, freedom):
         return {}
     shift = beside[:count] - alone

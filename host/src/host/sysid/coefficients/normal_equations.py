@@ -24,7 +24,7 @@ ROUNDING = 1e-30  # a sum of squares below it is rounding
 
 @dataclass(frozen=True, slots=True)
 class Prior:
-    """What is known of the unknowns before the flight.
+    """Prior of the unknowns: information and its right-hand side.
 
     Attributes
     ----------

@@ -52,7 +52,7 @@ EXPECTED = (
 
 @dataclass(frozen=True, slots=True)
 class FlightCondition:
-    """Where the aircraft flies; None is what the file or the aircraft says."""
+    """Condition that the aircraft flies at; None is what the file or the aircraft says."""
 
     airspeed_mps: float | None = None
     alpha_rad: float | None = None

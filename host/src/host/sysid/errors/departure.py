@@ -24,7 +24,7 @@ from host.sysid.numerics.output_error_problem import OutputProblem
 
 @dataclass(frozen=True, slots=True)
 class Departure:
-    """By how much an estimate moves, and what one step and second order leave open of it.
+    """Shift of an estimate, and what one step and second order leave open of it.
 
     Attributes
     ----------

@@ -139,8 +139,8 @@ class OneStep:
         consider_sensitivity = -np.einsum("kij,il->klj", link, self.inverse)
         if count:
             whole = link.sum(axis=0)
-            told = _not_negative(normal - whole.T @ self.inverse @ whole)
-            covariance = np.linalg.pinv(prior + told, hermitian=True)
+            information = _not_negative(normal - whole.T @ self.inverse @ whole)
+            covariance = np.linalg.pinv(prior + information, hermitian=True)
             added = covariance @ (right - whole.T @ step.sum(axis=0))
             step = step + consider_sensitivity @ added
         sensitivity = self._placed(consider_sensitivity.sum(axis=0).T)

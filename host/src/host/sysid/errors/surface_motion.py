@@ -1,4 +1,4 @@
-"""Do surfaces move between samples as servos do, along lines, or are they held?
+"""Motion of surfaces between samples: as servos move, along lines, or held.
 
 Where an instrument's file says how they were measured they move, kinks included (`input_kinks`).
 Of a table of others the data may say: how far from lines to that motion is one more parameter of

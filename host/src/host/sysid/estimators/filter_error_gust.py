@@ -26,8 +26,8 @@ from host.sysid.numerics.output_error_problem import OutputProblem
 
 # What else disturbs: thrust and longitudinal gusts; the drift of the attitude filter.
 OTHER_PROCESS_STATES = ("airspeed_mps", "phi_rad")
-# With every column held for five rows the delay of the IMU scattered by 0.5 ms in calm air, told to
-# 0.2 by the filter, and 47 of 54 intervals held: by output error all of them.
+# With every column held for five rows the delay of the IMU scattered by 0.5 ms in calm air, known
+# to 0.2 by the filter, and 47 of 54 intervals held: by output error all of them.
 SLOW_IN_CALM = "the air is calm and every column slow; output error stands instead"
 # Without a force the filter takes what it thinks are gusts for the delay of the vane: of 20 ms
 # of a light aircraft it found 0 and 30, known to 6, by output error 13, known to 9.

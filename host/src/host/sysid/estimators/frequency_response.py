@@ -33,7 +33,7 @@ SLOPE_STEP = 1e-6  # of a parameter's half-width: central differences
 
 @dataclass(frozen=True, slots=True)
 class RecordedResponse:
-    """What records say of outputs over inputs, without a model.
+    """Response of outputs to inputs as records have it, without a model.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ def _partial_coherence(power: Spectrum, inputs: int) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class ModelResponse:
-    """What a fitted model says of outputs over inputs, (f, outputs, inputs) each.
+    """Response of outputs to inputs of a fitted model, (f, outputs, inputs) each.
 
     `half_width` is that of 95 %: real part relative in magnitude, imaginary part in rad of phase.
     """

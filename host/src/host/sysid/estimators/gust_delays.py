@@ -290,7 +290,7 @@ def _removable(delay: DelayGroup, value_s: float, dt_s: float) -> float:
 
 
 def _parameter(delay: DelayGroup, removed_s: float, dt_s: float, *, by_force: bool) -> Parameter:
-    """Return what stands for a delay of which a part is removed already; the prior is of all."""
+    """Return a delay as parameter whose first part is removed; the prior is of all."""
     if not _late_by_pade(delay):
         return Parameter(delay.name, -removed_s, prior_sd=delay.prior_sd_s)
     return Parameter(

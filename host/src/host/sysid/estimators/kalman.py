@@ -28,7 +28,7 @@ REPORTED_INFLATION = 2.0  # from here on there is a warning
 
 @dataclass(slots=True)
 class JointFilter:
-    """What the filters share: model, noise, layout of the augmented state.
+    """Parts that the filters share: model, noise, layout of the augmented state.
 
     Attributes
     ----------

@@ -120,7 +120,7 @@ def _settled(moved: Array, covariance: Array) -> bool:
 
 @dataclass(frozen=True)
 class _Layout:
-    """Where the unknowns stand behind the states, and what is known of them before.
+    """Layout of the unknowns behind the states, and their prior.
 
     `common` of them go on from maneuver to maneuver.
     """

@@ -1,4 +1,4 @@
-"""Do the inputs act where the model says that they do not? A score test beside gust and noise.
+"""Score test of inputs that act where the model says that they do not, in gust and noise.
 
 Without the lift of an elevator the gust filter takes what az lacks for moving air, and air moves q:
 M_q was 10 % off, known to 3 %. A free simulation cannot tell, for the gust is all that it leaves;

@@ -7,7 +7,7 @@ input's rate for a lead and went to where the prior is.
 
 What output error leaves is weighed as noise with a memory. Gusts are slow, a delay shows at the
 edges of the inputs: as white noise the gusts hid it there (0.5 m/s, no vanes: -7 to 13 ms of 2,
-and L_p went with it by 4 % a millisecond), whitened it is told to 2 ms.
+and L_p went with it by 4 % a millisecond), whitened it is known to 2 ms.
 
 Bandwidth and rate limit are carried: 1 / (2 pi f) is a delay too, and a free bandwidth beside a
 free delay drew the filter to 3.5 Hz on thor75, where 6 Hz and 50 ms were published.
@@ -46,7 +46,7 @@ POSTERIOR_PRIOR_RATIO = 0.7  # of the prior's deviation: below it the data say i
 # Of the noise of output error: its memory, in means over this long; and what a model lacks at any
 # frequency, over the motion: whitened, calm air's small errors of the model would tell the delay.
 AR_ORDER, AR_STEP_S, LACK = 8, 0.02, 0.02
-COLLINEAR = 0.9  # correlation of a derivative with the servo: they cannot be told apart
+COLLINEAR = 0.9  # correlation of a derivative with the servo: they cannot be separated
 
 # The third argument is a fit behind servos not far from these, to start from, or None.
 Fit = Callable[[LinearModel, Sequence[Maneuver], FitResult | None], FitResult]
@@ -100,7 +100,7 @@ class ServoEstimate:
 
     @property
     def alike(self) -> tuple[str, ...]:
-        """Parameters that cannot be told apart from the servo."""
+        """Parameters that cannot be separated from the servo."""
         return tuple(n for n, r in self.correlation.items() if r > COLLINEAR)
 
     @property

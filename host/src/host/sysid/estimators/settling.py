@@ -17,7 +17,7 @@ STEPS = {"history_step": "iteration", "history_s": "t_s"}
 
 @dataclass(frozen=True, slots=True)
 class Settling:
-    """Since when each parameter stayed within a tenth of its end.
+    """Step from which each parameter stayed within a tenth of its end.
 
     Attributes
     ----------

@@ -12,7 +12,7 @@ from host.arrays import Array
 
 @dataclass(frozen=True, slots=True)
 class ColumnChange:
-    """What was done to some columns.
+    """Record of what was done to some columns, and why.
 
     Attributes
     ----------

@@ -22,7 +22,7 @@ QUICK = ("short-period", "roll")
 
 
 class NoManeuverError(IdentificationError):
-    """No maneuver that a model could be fitted to."""
+    """Error: no maneuver that a model could be fitted to."""
 
 
 def fitted_and_held_out(

@@ -48,9 +48,11 @@ READ = (*TEXT_KINDS, ".parquet", ".mat")
 
 @dataclass(frozen=True, slots=True)
 class FlightColumns:
-    """SI columns on an even grid, notes about what was done to them, how they were recorded, of a
-    log the calibration that made them, what checks found in them, the step of the numbers of each
-    quantised one, and of which surfaces the columns are shares of full travel."""
+    """Columns of a flight in SI on an even grid, and what is known of them.
+
+    Notes say what was done to them, findings what checks found. `resolution` is the step of the
+    numbers of each quantised one; of a log there is the calibration that made them.
+    """
 
     columns: dict[str, Array]
     notes: list[str]

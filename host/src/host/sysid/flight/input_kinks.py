@@ -2,9 +2,10 @@
 
 A linear model is driven by the line from sample to sample. A servo that starts at once and settles
 leaves that line on one side of the motion: with kinks at samples of 10 ms, 0.3 ms late, which is
-0.8 % of L_p at 20 rad/s. The mean over a sample is told by the curvature on both sides; one that is
-far larger than its neighbours is a kink, and where it lies the two sides tell (subcell resolution:
-Harten, J. Comput. Phys. 83, 1989). Samples of a smooth motion move by a twelfth of its curvature.
+0.8 % of L_p at 20 rad/s. The mean over a sample follows from the curvature on both sides. One that
+is far larger than its neighbours is a kink, and the two sides say where it lies (subcell
+resolution: Harten, J. Comput. Phys. 83, 1989). Samples of a smooth motion move by a twelfth of its
+curvature.
 """
 
 from __future__ import annotations

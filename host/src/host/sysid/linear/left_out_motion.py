@@ -171,8 +171,7 @@ def _alone(
 def _known_no_better(wide: FitResult, deviations: Mapping[str, float]) -> FitResult:
     """Return a fit in which some parameters are known no better than by these deviations.
 
-    What they move the others by goes with them. With 0.007 rad/s of noise on p the data told N_p to
-    a tenth of its prior, a third of what it was, and N_beta came out 8 to 15 % large, known to 10.
+    What they move the others by goes with them.
     """
     covariance = wide.covariance.copy()
     for name, sd in deviations.items():

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Answer:
-    """What one model of one axis says, and what it rests on."""
+    """Answer of one model of one axis, and what it rests on."""
 
     template: str
     method: str

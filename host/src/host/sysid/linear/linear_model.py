@@ -42,8 +42,7 @@ NO_AIRSPEED = (
     "the data have no airspeed_mps: it is taken as constant; accelerations, gusts and coefficients"
     " need it and are left out"
 )
-# Forces along it need it, all else is told without. Of a light aircraft, in g, it put L_r 10 to 16
-# and N_r 6 to 11 % off, under trust.
+# Forces along it need it, all else is determined without.
 DOUBTFUL = {"ay_mps2"}
 SIDE_FORCE_DOUBTED = "ay_mps2 has an open finding, and is left out of the fit"
 STILL_RAD = 1e-9  # a surface that moves less stands still but for rounding
@@ -51,7 +50,7 @@ STILL_RAD = 1e-9  # a surface that moves less stands still but for rounding
 
 @dataclass(frozen=True)
 class ChosenModel:
-    """Which model is fitted to which maneuvers, and how.
+    """Choice of model, maneuvers and method.
 
     Attributes
     ----------
@@ -295,7 +294,7 @@ def imu_place_m(i: SensorErrorModel) -> float:
 
 
 def with_drag_arm(model: LinearModel, trim: Trim, i: SensorErrorModel) -> LinearModel:
-    """Free the height of the accelerometers where drag is told: a pitch rate makes none.
+    """Free the height of the accelerometers where drag is fitted: a pitch rate makes none.
 
     Every other place is carried. This one moves drag by more than its size, and the pitch rate
     beside angle and elevator tells it.

@@ -62,7 +62,7 @@ class LinearFit:
 
 @dataclass(frozen=True)
 class LinearEstimate:
-    """What estimation made: a fit on prepared columns, and what departed from the trim.
+    """Result of estimation: a fit on prepared columns, and what departed from the trim.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ class LinearEstimate:
 
 @dataclass(frozen=True)
 class LinearIntervals:
-    """What the intervals count.
+    """Result of the intervals: noise, systematic errors and their sum.
 
     Attributes
     ----------

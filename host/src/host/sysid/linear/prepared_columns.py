@@ -107,7 +107,7 @@ def prepare_columns(
 
 
 def _behind_servos(columns: PreparedColumns) -> PreparedColumns:
-    """Bring commands behind the servos that the data tell."""
+    """Replace commands by surfaces behind the servos that were estimated."""
     servo, remark = servo_of(columns.chosen, columns.first_departures)
     if servo is None:
         return columns
@@ -128,7 +128,7 @@ def _in_means(columns: PreparedColumns) -> PreparedColumns:
 
 
 def _moving_between_samples(columns: PreparedColumns) -> PreparedColumns:
-    """Let surfaces move between samples as servos do, or hold them, as the data say."""
+    """Choose by the data whether surfaces move between samples as servos do or are held."""
     chosen, behind = columns.chosen, columns.servo is not None
     motion = between_samples(columns.used, chosen.model, chosen.trim, behind=behind)
     if motion == HELD:

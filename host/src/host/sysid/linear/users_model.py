@@ -1,6 +1,6 @@
 """A user's model: the method that was asked for, or the one for the noise that the data show.
 
-Three kinds of noise are told apart by an exact likelihood on the same outputs: white noise of the
+Three kinds of noise are compared by an exact likelihood on the same outputs: white noise of the
 sensors, noise with a memory, and moving air that the aircraft follows. The last is filter error,
 with the gust as a state where the model has a vane and the airspeed is known. What was asked for is
 done or refused, never replaced.

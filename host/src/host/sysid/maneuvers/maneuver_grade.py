@@ -13,7 +13,7 @@ from host.sysid.maneuvers.maneuver_detection import RESPONSE_OF, TRIM_S, Detecte
 
 @dataclass(frozen=True, slots=True)
 class Grade:
-    """What a test point is worth before anyone fits it.
+    """Worth of a test point before anyone fits it.
 
     `score` is 0 to 1; `remarks` name what is wrong in words.
     """

@@ -213,7 +213,7 @@ class IdentifiabilityFlag:
 
 @dataclass(frozen=True, slots=True)
 class Identifiability:
-    """Whether the data identify a fit's parameters in practice, and which of them are in doubt.
+    """Practical identifiability of a fit's parameters, and which of them are in doubt.
 
     Attributes
     ----------

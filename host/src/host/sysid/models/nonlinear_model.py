@@ -30,7 +30,7 @@ Named = tuple[tuple[str, str], ...]
 
 @dataclass(frozen=True)
 class Equations:
-    """What a user wrote: texts of expressions and the numbers that they name.
+    """Equations as a user wrote them: texts of expressions and the numbers that they name.
 
     Attributes
     ----------
@@ -260,7 +260,7 @@ class NonlinearModel(LinearModel):
         return self.equations
 
     def local_names(self, maneuver: int) -> tuple[str, ...]:
-        """Names of the constants that belong to one maneuver, its own parameters last."""
+        """Return the names of one maneuver's constants, its own parameters last."""
         own = (f"{p.name}@{maneuver}" for p in self.own_parameters)
         return (*LinearModel.local_names(self, maneuver), *own)
 

@@ -267,7 +267,7 @@ class LinearModel:
         return self.outputs
 
     def local_names(self, maneuver: int) -> tuple[str, ...]:
-        """Names of the constants that belong to one maneuver (counted from 1)."""
+        """Return the names of the constants that belong to one maneuver (counted from 1)."""
         return (
             *(f"bias_rate.{s}@{maneuver}" for s in self.state_biases),
             *(f"bias.{y}@{maneuver}" for y in self.output_biases),

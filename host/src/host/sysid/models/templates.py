@@ -52,7 +52,7 @@ class Trim:
 
 @dataclass(slots=True)
 class _Builder:
-    """Collects the entries of a model by signal names."""
+    """Collector of the entries of a model by signal names."""
 
     name: str
     states: tuple[str, ...]

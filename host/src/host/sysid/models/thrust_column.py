@@ -28,7 +28,7 @@ _PER_N = Quantity("per N", -1e6, 1e6, "1 N on a gram is 1000 m/s2")
 
 @dataclass(frozen=True, slots=True)
 class ThrustColumn:
-    """Per newton: to the rate of each state, (n,), and to each output directly, (p,); SI."""
+    """Effect per newton: on the rate of each state, (n,), and on each output directly, (p,); SI."""
 
     rates_per_n: Array
     outputs_per_n: Array

@@ -22,7 +22,7 @@ def _none() -> Array:
 
 @dataclass(frozen=True)
 class ModelError:
-    """What one test says that a model lacks, of the first parameters; what is empty says nothing.
+    """Model error by one test, of the first parameters; an empty part says nothing.
 
     Attributes
     ----------

@@ -118,7 +118,7 @@ def input_within(
     u: Array,
     by_shift: Array,
 ) -> None:
-    """Do the same for a share of the step behind sample `k`."""
+    """Return the input at a share of the step behind sample `k`."""
     ahead = min(k + 1, len(inputs) - 1)
     for j in range(inputs.shape[1]):
         here, there, slope, slope_there = inputs[k, j], inputs[ahead, j], 0.0, 0.0

@@ -27,7 +27,7 @@ def rates(x: Array, u: Array, p: Array, c: Array, t: Array, f: Array) -> None:
 def rate_slopes(
     x: Array, u: Array, p: Array, c: Array, t: Array, f: Array, fx: Array, fu: Array, fp: Array
 ) -> None:
-    """Do the same, with slopes by states, inputs and parameters."""
+    """Write dx/dt and its slopes by states, inputs and parameters."""
     raise NotImplementedError
 
 
@@ -39,7 +39,7 @@ def readings(x: Array, u: Array, p: Array, c: Array, t: Array, y: Array) -> None
 def reading_slopes(
     x: Array, u: Array, p: Array, c: Array, t: Array, y: Array, yx: Array, yu: Array, yp: Array
 ) -> None:
-    """Do the same, with slopes."""
+    """Write the outputs and their slopes."""
     raise NotImplementedError
 
 

@@ -91,7 +91,7 @@ class Objective(ABC, Generic[Trial]):
 
 @dataclass(frozen=True, slots=True)
 class GaussNewtonResult(Generic[Trial]):
-    """End of a search.
+    """Result of a search.
 
     Attributes
     ----------

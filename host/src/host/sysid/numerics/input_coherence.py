@@ -393,7 +393,7 @@ def _known_directions(
     1946). The innovation variance has 2 / samples. The AR coefficients have the asymptotic
     covariance R^-1 / samples; with coefficient k the power of a direction x, w when whitened, moves
     by -2 sum w[t] x[t - k]. Slow noise is known to few degrees of freedom along slow directions:
-    those below `FEWEST_FREEDOM` are left out, for nothing could be told there.
+    those below `FEWEST_FREEDOM` are left out, for they determine nothing.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ STEP_TOLERANCE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """What the simulation of one maneuver is given at a parameter vector."""
+    """Inputs of the simulation of one maneuver at a parameter vector."""
 
     local: Array  # unknowns of the maneuver, a zero behind
     start: Array
@@ -123,7 +123,7 @@ class NonlinearProblem(OutputProblem):
     def _simulated(
         self, number: int, theta: Array, slope: Array | None
     ) -> tuple[Array, Array] | None:
-        """Do the same, by steps between samples."""
+        """Simulate a maneuver by steps between samples."""
         g, dt_s = self.given(number, theta), self._parts[number].dt_s
         x = np.empty((len(g.inputs), len(self.model.states)))
         y = np.empty((len(g.inputs), len(self.model.outputs)))

@@ -238,7 +238,7 @@ class OutputProblem:
     def _simulated(
         self, number: int, theta: Array, slope: Array | None
     ) -> tuple[Array, Array] | None:
-        """Do the same for outputs that are not late.
+        """Return outputs that are not late, and states.
 
         The sensitivities obey dx/dtheta[k+1] = Phi dx/dtheta[k] + d[Phi Gamma]/dtheta z[k]
         (EQUATIONS.md, eq. 25).

@@ -29,7 +29,7 @@ def restricted_slopes(problem: FilterProblem, theta: Array, bounds: Array) -> Ar
 
     Half the slope of ln det (X' S^-1 X) by the covariance S of all noise of a maneuver; what its
     constants do to the outputs, X, stays as it is at `theta`. Zero where the constants of a
-    maneuver cannot be told apart.
+    maneuver cannot be separated.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def _changes(
 def _half_change(own: Array, change: Array) -> float:
     """Return half the change of ln det own where it becomes own + change + change'.
 
-    To first order: tr(own^-1 change). NaN where constants cannot be told apart, or there are none.
+    To first order: tr(own^-1 change). NaN where constants cannot be separated, or there are none.
     """
     scale = np.sqrt(np.diag(own))
     if not (

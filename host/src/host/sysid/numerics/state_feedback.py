@@ -1,4 +1,4 @@
-"""Whether an input is a function of measured signals: gains, delay, lag and wash-out of its law.
+"""Test of an input as a function of measured signals: gains, delay, lag and wash-out.
 
     u(t) = sum_k K_k * F(s) * x_k(t - delay) + constant,   F(s) = 1 / (1 + s lag) * s T / (1 + s T)
 
@@ -58,7 +58,7 @@ SHAPES: tuple[Shape, ...] = tuple((lag, wash) for lag in LAGS_S for wash in WASH
 
 @dataclass(frozen=True, slots=True)
 class FeedbackLaw:
-    """What an input follows.
+    """Law that an input follows.
 
     Attributes
     ----------
@@ -378,7 +378,7 @@ def _r2(products: Array, noise: Array, columns: Sequence[int]) -> Array:
 
 
 class _Fit(NamedTuple):
-    """Of each matrix of products: R2, share of the input's power explained, gains (..., signals).
+    """Fit of each matrix of products: R2, share of power explained, gains (..., signals).
 
     What is explained may be more than there is, as noise is not known exactly. It tells the better
     delay; R2 is no better than noise is known.

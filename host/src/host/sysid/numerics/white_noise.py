@@ -1,4 +1,4 @@
-"""White noise of a column, told from its motion by third differences."""
+"""White noise of a column, separated from its motion by third differences."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ class PreparedFlight:
 
 @dataclass(frozen=True, slots=True)
 class _Agreement:
-    """What the sensors of a flight say of each other, or what their calibration leaves open."""
+    """Reconstruction of a flight, or what calibration alone leaves open of its sensors."""
 
     found: Compatibility | None = None
     by_calibration: Compatibility | None = None
@@ -82,7 +82,7 @@ def prepare(given: FlightAtHand) -> PreparedFlight:
     in_rad, travel = with_surface_angles(read.columns, read.shares, known)
     commands = commands_of(in_rad, sensors)
     columns = surface_positions(in_rad, sensors)
-    told = recording_notes(sensors) if instrument is not None or commands else []
+    open_notes = recording_notes(sensors) if instrument is not None or commands else []
     found, small = _maneuvers(given, columns)
     # A law is seen in commands: a servo moves the surface later and slower.
     fed_back = feedback_findings({**columns, **commands}, found)
@@ -126,7 +126,7 @@ def prepare(given: FlightAtHand) -> PreparedFlight:
             *change_of(flight.corrected, corrected, "thrust added", "measured, or of the power"),
         ),
     )
-    said = (*read.notes, *travel, *told, *overlap_notes(how.stretches), *agreed.notes, *line)
+    said = (*read.notes, *travel, *open_notes, *overlap_notes(how.stretches), *agreed.notes, *line)
     return PreparedFlight(flight, agreed.found, said, agreed.unchecked)
 
 
@@ -157,7 +157,7 @@ def _agreement(
     instrument: SensorErrorModel | None,
     sensors: SensorErrorModel,
 ) -> _Agreement:
-    """Hold the sensors of a flight against each other."""
+    """Compare the sensors of a flight with each other."""
     known, how = given.known, given.how
     notes: tuple[str, ...] = ()
     try:
@@ -177,7 +177,7 @@ def _agreement(
 def _hidden_angles(
     corrected: Mapping[str, Array], agreement: Compatibility | None, known: AircraftData | None
 ) -> tuple[FlowAngles | None, tuple[str, ...]]:
-    """Return the flow angles that no vane measured, where they can be told, and a line of them."""
+    """Return the flow angles that no vane measured, as far as estimated, and a line of them."""
     if agreement is None or agreement.vanes or known is None:
         return None, ()
     from host.sysid.reconstruction.flow_angles import reconstruct_flow_angles

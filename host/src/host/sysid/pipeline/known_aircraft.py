@@ -16,7 +16,7 @@ from host.sysid.flight.flight_tables import FlightColumns
 
 @dataclass(frozen=True, slots=True)
 class AircraftData:
-    """What is known of an aircraft and its sensors before the flight.
+    """Knowledge of an aircraft and its sensors before the flight.
 
     Attributes
     ----------

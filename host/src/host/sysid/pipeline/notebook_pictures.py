@@ -48,7 +48,7 @@ class Pictures(Mapping[str, "Figure"]):
         return save_all(self._figures, Path(folder))
 
     def _repr_html_(self) -> str:
-        """Show all: as images, in which nothing can run."""
+        """Return all as images, in which nothing can run."""
         return "".join(_image(name, figure) for name, figure in self._figures.items())
 
 

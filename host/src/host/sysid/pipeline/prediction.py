@@ -266,7 +266,7 @@ def _late_inputs(path: Path) -> dict[str, float]:
 
 
 def _as_delayed(columns: Mapping[str, Array], late_s: Mapping[str, float]) -> dict[str, Array]:
-    """Return the columns, inputs as late as the model was told of them.
+    """Return the columns, inputs as late as the model has them.
 
     A servo of 40 ms was left out, and q_radps of the record fitted differed by 25 in place of 4 %.
     """

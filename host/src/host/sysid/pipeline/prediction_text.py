@@ -25,7 +25,7 @@ def simulation_lines(one: Simulation, source: str, *, constants: bool) -> list[s
 
 
 def _held(m: SimulatedModel, *, constants: bool) -> str:
-    """Return what else of a model was fitted, or what stands in its place."""
+    """Return what else of a model was fitted, or its replacement."""
     if constants:
         return "biases and start states fitted to each maneuver"
     if has_equations(m.model):

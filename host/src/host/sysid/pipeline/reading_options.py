@@ -16,7 +16,7 @@ OfEach = str | Path | Sequence[str | Path | None] | None  # one for all flights,
 
 @dataclass(frozen=True, slots=True)
 class ReadingOptions:
-    """How flights are read.
+    """Options of reading a flight.
 
     Attributes
     ----------

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 COEFFICIENTS = "coefficients"  # the name of the standard ones
 DEFAULT_MODELS = ("longitudinal", "lateral")
-# What stands in the place of a default model, and why.
+# The replacement of a default model, and why.
 WITHOUT_AIRSPEED = (
     {"longitudinal": "short-period", "lateral": "dutch-roll"},
     "without airspeed_mps longitudinal and lateral cannot be told: short-period and dutch-roll by"

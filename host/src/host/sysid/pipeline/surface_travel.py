@@ -35,6 +35,6 @@ def with_surface_angles(
         return result, []
     return result, [
         f"{', '.join(unknown)}: the log has shares of full travel and no aircraft file gives its"
-        " [surfaces] limits: what stands for 1 rad is full deflection, and derivatives of these"
+        " [surfaces] limits: 1 rad in a column is full deflection, and derivatives of these"
         " inputs are per full deflection"
     ]

@@ -5,7 +5,7 @@ across have the gusts too: a_z = qbar (c0 + c_alpha alpha + c_q q_hat + c_de de)
 path's angle and a gust. Path, attitude, wind, gusts and the coefficients c are estimated together
 by a Kalman smoother over linearised measurements, repeated about its own answer (Bell, The
 Iterated Kalman Smoother as a Gauss-Newton Method, 1994; Klein & Morelli, Aircraft System
-Identification, ch. 10). The coefficients are told by what the controls move, gusts by what is left.
+Identification, ch. 10). The controls' motion determines the coefficients, the rest the gusts.
 """
 
 from __future__ import annotations
@@ -174,7 +174,7 @@ def flying(columns: Mapping[str, Array]) -> slice:
 
 @dataclass(frozen=True)
 class _Record:
-    """What the smoother takes, at its own steps."""
+    """Inputs of the smoother, at its own steps."""
 
     t_s: Array
     turn: Array  # (m, 3, 3) of the autopilot's attitude

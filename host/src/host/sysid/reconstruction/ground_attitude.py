@@ -2,8 +2,8 @@
 
 In flight nothing tells the tilt: all that an autopilot senses turns with its IMU, and every angle
 of attack that no vane measured is off by it. At rest the accelerometer shows gravity: the pitch it
-sees, less that of the aircraft on its wheels, is tilt + bias / g. The bias is told in flight, by
-GPS in turns.
+sees, less that of the aircraft on its wheels, is tilt + bias / g. GPS in turns
+tells the bias.
 """
 
 from __future__ import annotations

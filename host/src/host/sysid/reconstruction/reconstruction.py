@@ -59,7 +59,7 @@ NOT_EXCITED_NO_GPS = "not told from attitude and gusts without GPS; the calibrat
 
 
 class NoAgreementError(IdentificationError):
-    """No errors within reach of the calibration make the sensors agree."""
+    """Error: no errors within reach of the calibration make the sensors agree."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +216,7 @@ def _tests_without_gps(
     covariance: Array,
     priors: Mapping[str, tuple[float, float]],
 ) -> tuple[ConsistencyTest, ...]:
-    """Return the tests of the file by what is told without GPS.
+    """Return the tests of the file by what is estimated without GPS.
 
     The zero of the alpha vane is one beside the IMU's, and what comes out as a gyro's bias is off
     by as much again as the file says (in calm air 2.1 mrad/s about q of 2.0, known to 0.1): as they

@@ -49,7 +49,7 @@ def corrections(found: Compatibility) -> tuple[Correction, ...]:
 
 
 def without_estimated_delays(found: Compatibility) -> Compatibility:
-    """Return a check whose delays count as not told: those of the aircraft file stand."""
+    """Return a check with the delays of the aircraft file in place of estimated ones."""
     return replace(
         found,
         findings=tuple(

@@ -21,7 +21,7 @@ from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.response import Response
 
 CONSTANT_ROUNDS = 6  # steps to the constants of each record, where outputs bend in them
-# With the weights of the first guess alone az was told by offsets of 20 m/s2, and its residual was
+# With the weights of the first guess alone offsets of 20 m/s2 explain az, and its residual is
 # coherent with the inputs in calm air (5 times the noise).
 WEIGHINGS = 3
 

@@ -1,4 +1,4 @@
-"""Does a free simulation leave more than the fit's own gust and noise model predicts?
+"""Test whether free simulation leaves more than the fit's own gust and noise predict.
 
 Filter error explains what it cannot simulate as moving air. Driven by that air alone, its model
 would miss the measured outputs by a certain rms: more is a model error that the filter followed.

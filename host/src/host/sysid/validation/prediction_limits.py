@@ -46,7 +46,7 @@ SETTLING = 200  # means before a drawn AR series counts
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """How an output of unseen maneuvers is predicted, in means over `BLOCK_S`.
+    """Prediction of an output in unseen maneuvers, in means over `BLOCK_S`.
 
     Attributes
     ----------
