@@ -1,6 +1,6 @@
 # Two commands: `make demo` and `make test`. Both set up what they need first.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test native mega sitl lint format bench study judgement fleet-bench live-bench flight-bench imu-bench faults power-cuts card-images fuzz mutants hw clean input-flights ideas ground-triggers
+.PHONY: help setup demo test native mega sitl lint format bench study judgement tune-bench fleet-bench live-bench flight-bench imu-bench faults power-cuts card-images fuzz mutants hw clean input-flights ideas ground-triggers
 PYTHON := .venv/bin/python
 PIO := .venv/bin/pio
 # Runs a module of tests/chip in that folder; what it imports lies elsewhere.
@@ -45,6 +45,9 @@ bench: setup ## damage, speed and identification beside their peers
 
 study: setup sitl ## tables and pictures of identification in build/study, nine minutes (SIZE=full: two hours)
 	@cd host && ../$(PYTHON) -m studies ../build/study --size $(or $(SIZE),small)
+
+tune-bench: setup sitl ## gains of one identified flight flown on 200 aircraft: margins by injected sines, steps, gusts (AUTOPILOT=px4, inav; half an hour)
+	@cd host && ../$(PYTHON) -m studies.tuned_flights $(if $(AUTOPILOT),--autopilot $(AUTOPILOT)) $(TUNE_BENCH)
 
 judgement: setup sitl ## one score of answers over worlds: right, wrong, refused, honest; four flights a world, eight minutes of a core (SIZE=full: 200, a night; FLIGHTS=n)
 	@cd host && ../$(PYTHON) -m studies.judgement --size $(or $(SIZE),small) $(if $(FLIGHTS),--flights $(FLIGHTS)) $(if $(FIRST),--first $(FIRST))

@@ -10,6 +10,7 @@ from host.faces import lazily
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from host.control import Tuning, tune
     from host.errors import CalibrationError, IdentificationError, LogError, NotALogError
     from host.log import FlightLog, read_log
     from host.sysid.pipeline import Identification, Prediction, identify, predict
@@ -22,10 +23,12 @@ __all__ = [
     "LogError",
     "NotALogError",
     "Prediction",
+    "Tuning",
     "__version__",
     "identify",
     "predict",
     "read_log",
+    "tune",
 ]
 __version__ = "0.1.0"
 
@@ -41,8 +44,10 @@ __getattr__ = lazily(
         "LogError": "errors",
         "NotALogError": "errors",
         "Prediction": "sysid.pipeline.prediction",
+        "Tuning": "control.tuning",
         "identify": "sysid.pipeline.stages",
         "predict": "sysid.pipeline.prediction",
         "read_log": "log",
+        "tune": "control.tuning",
     },
 )

@@ -8,7 +8,8 @@ import control
 import numpy as np
 import pytest
 from host.arrays import Array
-from host.control.autopilots import ardupilot
+from host.control.autopilots import ardupilot, inav, px4
+from host.control.autopilots.known import AUTOPILOTS
 from host.control.autopilots.structure import state_space
 from host.control.margins import FAR_DB, margins
 from host.control.plant import continuous, sampled
@@ -67,19 +68,61 @@ def test_arduplane_holds_a_rate_by_feed_forward_alone() -> None:
     assert float(out) == pytest.approx(0.2 * 0.8 * 0.2 / (math.pi / 4.0))
 
 
-def test_the_law_that_is_analysed_is_the_one_that_flies() -> None:
-    gains = {"P": 0.15, "I": 0.2, "D": 0.004, "FF": 0.3, "TC": 0.45}
-    loop = ardupilot.structure("pitch", {"PTCH_RATE_FLTE": 5.0}, 15.0).loop(gains, 18.0)
+GAINS = {
+    "ardupilot": {"P": 0.15, "I": 0.2, "D": 0.004, "FF": 0.3, "TC": 0.45},
+    "px4": {"P": 0.15, "I": 0.2, "D": 0.01, "FF": 0.3, "TC": 0.45},
+    "inav": {"P": 9.0, "I": 7.0, "D": 3.0, "FF": 50.0},
+}
+
+
+@pytest.mark.parametrize("autopilot", AUTOPILOTS)
+def test_the_law_that_is_analysed_is_the_one_that_flies(autopilot: str) -> None:
+    logged = {"PTCH_RATE_FLTE": 5.0}
+    loop = AUTOPILOTS[autopilot].structure("pitch", logged, 15.0).loop(GAINS[autopilot], 18.0)
     a, b, c, d = state_space(loop)
     rng = np.random.default_rng(2)
-    state: Array = np.zeros(4)
-    own: Array = np.zeros(4)
+    state: Array = np.zeros(loop.states)
+    own: Array = np.zeros(loop.states)
     for _ in range(200):
         angle, rate = rng.standard_normal(2)
         state, flown = loop.step(state, np.array(-angle), np.array(rate))
         linear = float((c @ own + d @ [angle, rate])[0])
         own = a @ own + b @ [angle, rate]
         assert linear == pytest.approx(float(flown), rel=1e-9, abs=1e-12)
+
+
+def test_px4_multiplies_gains_by_the_square_of_its_speed_scale_and_feed_forward_by_it() -> None:
+    law = px4.structure("roll", {"FW_AIRSPD_TRIM": 15.0}, 15.0)
+    gains = {"P": 0.2, "I": 0.0, "D": 0.0, "FF": 0.5, "TC": 0.4}
+    _, out = law.loop(gains, 30.0).step(np.zeros(3), np.array(0.2), np.array(0.1))
+    # 0.5 rad/s asked, 0.1 flown, scale 1/2: 0.25 x 0.2 x 0.4 + 0.5 x 0.5 x 0.5.
+    assert float(out) == pytest.approx(0.25 * 0.2 * 0.4 + 0.5 * 0.5 * 0.5)
+
+
+def test_px4_integrates_behind_its_output() -> None:
+    law = px4.structure("roll", {}, 15.0).loop({**GAINS["px4"], "P": 0, "D": 0, "FF": 0}, 15.0)
+    state, first = law.step(np.zeros(3), np.array(0.45), np.array(0.0))
+    _, second = law.step(state, np.array(0.45), np.array(0.0))
+    assert float(first) == 0.0
+    assert float(second) == pytest.approx(0.2 * 1.0 / 400.0)
+
+
+def test_two_ailerons_of_half_a_torque_each_are_full_travel() -> None:
+    usual = {"CA_SV_CS0_TRQ_R": -0.5, "CA_SV_CS1_TRQ_R": 0.5, "CA_SV_CS2_TRQ_P": 1.0}
+    assert px4.share_per_torque("roll", usual) == pytest.approx(1.0)
+    assert px4.share_per_torque("pitch", usual) == pytest.approx(1.0)
+    # Twice the effectiveness is half the travel.
+    assert px4.share_per_torque("roll", {k: 2.0 * v for k, v in usual.items()}) == 0.5
+
+
+def test_inav_holds_a_rate_by_its_documented_divisors() -> None:
+    law = inav.structure("roll", {"fw_i_level": 0.0}, 15.0)
+    loop = law.loop({"P": 31.0, "I": 0.0, "D": 0.0, "FF": 62.0}, 15.0)
+    state: Array = np.zeros(loop.states)
+    for _ in range(1000):  # a second: the biquad before the servo has settled
+        state, out = loop.step(state, np.array(0.1), np.array(0.05))
+    demand, rate = np.rad2deg(0.1) * 20 / 6.56, np.rad2deg(0.05)
+    assert float(out) == pytest.approx(((demand - rate) + 2.0 * demand) / 500.0, rel=1e-6)
 
 
 def test_the_speed_scaler_ends_where_arduplane_ends_it() -> None:

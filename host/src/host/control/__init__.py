@@ -4,16 +4,17 @@ from host.faces import lazily
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from host.control.autopilots.known import AUTOPILOTS
     from host.control.control_error import ControlError
     from host.control.parameter_file import read_parameters
-    from host.control.tuning import AUTOPILOTS, Tuning, tune
+    from host.control.tuning import Tuning, tune
 
 __all__ = ["AUTOPILOTS", "ControlError", "Tuning", "read_parameters", "tune"]
 
 __getattr__ = lazily(
     __name__,
     {
-        "AUTOPILOTS": "tuning",
+        "AUTOPILOTS": "autopilots.known",
         "ControlError": "control_error",
         "Tuning": "tuning",
         "read_parameters": "parameter_file",

@@ -71,7 +71,7 @@ def search(problem: Problem, seen: Scenarios, asked: Required) -> dict[str, floa
 
     settings = problem.structure.settings
     roles = tuple(problem.structure.searched)
-    highest = [round((settings[r].highest - _least(problem, r)) / settings[r].step) for r in roles]
+    highest = [_reach(problem, seen, role) for role in roles]
 
     def gains_of(steps: Array) -> dict[str, float]:
         chosen = {
@@ -104,6 +104,23 @@ def softest(problem: Problem) -> dict[str, float]:
         for role in problem.structure.searched
     }
     return problem.structure.completed(chosen, feed_forward(problem))
+
+
+def _reach(problem: Problem, seen: Scenarios, role: str) -> int:
+    """Return the steps of a parameter above its least until a loop of the drawn is unstable.
+
+    The documented range ends it where it comes first; PX4's reach to a hundred times what flies.
+    """
+    setting, least = problem.structure.settings[role], _least(problem, role)
+    last = round((setting.highest - least) / setting.step)
+    own = {one: _least(problem, one) for one in problem.structure.searched}
+    steps = 1
+    while steps < last:
+        gains = {**own, role: least + steps * setting.step}
+        if not seen.stable(problem.structure.completed(gains, feed_forward(problem))).all():
+            return steps
+        steps *= 2
+    return last
 
 
 def _least(problem: Problem, role: str) -> float:

@@ -1,18 +1,32 @@
 """Parameters of an autopilot in the files that ground stations load and save.
 
 Mission Planner: ``NAME,VALUE``, what follows a # is a comment (ExtLibs/Utilities/ParamFile.cs).
+QGroundControl: vehicle, component, name, value and type between tabs (developer guide, parameter
+file). INAV: lines of its command line, ``set name = value`` (docs/Cli.md).
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from host.control.control_error import ControlError
 from host.files.user_text import read_text
+
+FLOAT = 9  # MAV_PARAM_TYPE_REAL32
+# One line of each: the name and the value.
+NAMED = r"([A-Za-z]\w*)"
+LINES = tuple(
+    re.compile(pattern)
+    for pattern in (
+        rf"{NAMED}[,\s]+(\S+)",
+        rf"\d+\t\d+\t{NAMED}\t(\S+)\t\d+",
+        rf"set {NAMED} = (\S+)",
+    )
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,9 +38,17 @@ class Change:
     old: float | None
     unit: str
 
+    @property
+    def before(self) -> str:
+        """The old value as a comment has it."""
+        return f"before: {'not known' if self.old is None else f'{self.old:g}'}"
+
+
+Writer = Callable[[Iterable[Change], Iterable[str]], str]
+
 
 def read_parameters(path: Path) -> dict[str, float]:
-    """Return the parameters of a file: name and value, apart by a comma, spaces or a tab.
+    """Return the parameters of a file of any of the three.
 
     Lines of another shape are left out, as ground stations do.
 
@@ -38,15 +60,16 @@ def read_parameters(path: Path) -> dict[str, float]:
     text = read_text(path, ControlError, "parameters", encoding_errors="replace")
     found: dict[str, float] = {}
     for line in text.splitlines():
-        words = re.split(r"[,\s]+", line.split("#")[0].strip())
-        if len(words) != 2:
+        bare = line.split("#")[0].strip()
+        matched = next((m for one in LINES if (m := one.fullmatch(bare))), None)
+        if matched is None:
             continue
         try:
-            value = float(words[1])
+            value = float(matched[2])
         except ValueError:
             continue
         if math.isfinite(value):
-            found[words[0]] = value
+            found[matched[1]] = value
     if not found:
         raise ControlError(
             f"{path}: no parameter, expected lines such as RLL_RATE_P,0.08: save them from the"
@@ -55,21 +78,34 @@ def read_parameters(path: Path) -> dict[str, float]:
     return found
 
 
-def parameter_text(changes: Iterable[Change], heading: Iterable[str]) -> str:
-    """Return the new values as a file, the old one beside each."""
+def mission_planner_text(changes: Iterable[Change], heading: Iterable[str]) -> str:
+    """Return new values as Mission Planner loads them, the old one beside each."""
+    lines = [f"# {line}" for line in heading]
+    lines += [f"{one.name},{one.new:g}  # {one.before}" for one in changes]
+    return "\n".join(lines) + "\n"
+
+
+def qgroundcontrol_text(changes: Iterable[Change], heading: Iterable[str]) -> str:
+    """Return new values as QGroundControl loads them, the old ones in comments above."""
+    changes = tuple(changes)
+    lines = [f"# {line}" for line in heading]
+    lines += [f"# {one.name} {one.before}" for one in changes]
+    lines += [f"1\t1\t{one.name}\t{one.new:g}\t{FLOAT}" for one in changes]
+    return "\n".join(lines) + "\n"
+
+
+def cli_text(changes: Iterable[Change], heading: Iterable[str]) -> str:
+    """Return new values as lines for INAV's command line; gains are of the active profile."""
+    changes = tuple(changes)
     lines = [f"# {line}" for line in heading]
     for one in changes:
-        before = "not known" if one.old is None else f"{one.old:g}"
-        lines.append(f"{one.name},{one.new:g}  # before: {before}")
-    return "\n".join(lines) + "\n"
+        lines += [f"# {one.name} {one.before}", f"set {one.name} = {one.new:g}"]
+    return "\n".join([*lines, *(["save"] if changes else [])]) + "\n"
 
 
-def restoring_text(changes: Iterable[Change], defaults: Mapping[str, float]) -> str:
-    """Return the old values as a file; the autopilot's default where nobody said the old one."""
-    lines = ["# back to the values before"]
-    for one in changes:
-        if one.old is None:
-            lines.append(f"{one.name},{defaults[one.name]:g}  # the autopilot's default")
-        else:
-            lines.append(f"{one.name},{one.old:g}")
-    return "\n".join(lines) + "\n"
+def taken_back(changes: Iterable[Change], defaults: Mapping[str, float]) -> tuple[Change, ...]:
+    """Return the way back; the autopilot's default where nobody said the old value."""
+    return tuple(
+        Change(one.name, defaults[one.name] if one.old is None else one.old, one.new, one.unit)
+        for one in changes
+    )

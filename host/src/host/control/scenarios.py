@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -106,12 +106,38 @@ class Scenarios:
 
     def stable(self, gains: Mapping[str, float]) -> Array:
         """Return whether each closed loop is stable, shape (speeds * N,)."""
+        found = [np.max(np.abs(np.linalg.eigvals(a)), axis=-1) < 1.0 for a, _ in self._loops(gains)]
+        return np.concatenate(found)
+
+    def poles(self, gains: Mapping[str, float]) -> Spectra:
+        """Return the closed loops' poles as those of continuous time, 1/s, flat."""
+        z = np.concatenate([np.linalg.eigvals(a).ravel() for a, _ in self._loops(gains)])
+        z = z.astype(complex)
+        return np.asarray(np.log(z[np.abs(z) > 0.0]) / self.problem.period_s)
+
+    def steps(self, gains: Mapping[str, float], seconds: float) -> tuple[Array, Array]:
+        """Return time (T,) and angle over the demanded one (speeds * N, T) behind a step of it."""
+        count = round(seconds / self.problem.period_s)
         found = []
+        for (a, b), (_, _, c) in zip(self._loops(gains), self._plants, strict=True):
+            state = np.zeros((*a.shape[:-1], 1))
+            angle = np.empty((len(a), count))
+            for k in range(count):
+                angle[:, k] = (c[:, :1] @ state[:, : c.shape[-1]])[:, 0, 0]
+                state = a @ state + b
+            found.append(angle)
+        return self.problem.period_s * np.arange(count), np.concatenate(found)
+
+    def _loops(self, gains: Mapping[str, float]) -> Iterator[tuple[Array, Array]]:
+        """Return transitions and the demand's input of each airspeed's closed loops."""
         for airspeed, (a, b, c) in zip(self.problem.airspeeds_mps, self._plants, strict=True):
             law = state_space(self.problem.structure.loop(gains, airspeed))
-            poles = np.linalg.eigvals(closed(a, b, c, law))
-            found.append(np.max(np.abs(poles), axis=-1) < 1.0)
-        return np.concatenate(found)
+            # A demanded angle enters the law as a measured one does, with the other sign.
+            _, lb, _, ld = law
+            into = np.concatenate(
+                [-b * ld[0, 0], np.broadcast_to(-lb[:, :1], (len(a), len(lb), 1))], axis=1
+            )
+            yield closed(a, b, c, law), into
 
     @cached_property
     def _plants(self) -> list[tuple[Array, Array, Array]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,19 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 from host.aircraft.file import load_measured
 from host.control.actuator import actuator_of
-from host.control.autopilots import ardupilot
+from host.control.autopilots.known import AUTOPILOTS, Autopilot
 from host.control.control_error import ControlError
 from host.control.disturbances import gyro_noise_radps
 from host.control.loop_design import Design, design
-from host.control.parameter_file import Change, parameter_text, restoring_text
+from host.control.parameter_file import Change, taken_back
 from host.control.plant import RATES
 from host.control.scenarios import Problem
 from host.control.uncertain_axis import UncertainAxis, axes_of, axes_of_models
 
 if TYPE_CHECKING:
-    from host.sysid.pipeline import Identification
+    from matplotlib.figure import Figure
 
-AUTOPILOTS = {"ardupilot": ardupilot.structure}
+    from host.sysid.pipeline import Identification
 
 
 @dataclass(frozen=True)
@@ -56,13 +57,14 @@ class Tuning:
 
     Attributes
     ----------
-    autopilot, aircraft : str
+    autopilot : Autopilot
+    aircraft : str
     axes : tuple of AxisTuning
     notes : tuple of str
         What was not known, and what was taken in its place.
     """
 
-    autopilot: str
+    autopilot: Autopilot
     aircraft: str
     axes: tuple[AxisTuning, ...]
     notes: tuple[str, ...]
@@ -87,9 +89,9 @@ class Tuning:
         return {one.axis: dict(_worst(one)) for one in self.axes}
 
     def to_param(self) -> str:
-        """Return the changed parameters as a file for Mission Planner."""
+        """Return the changed parameters as the file that the ground station loads."""
         heading = [f"{self.aircraft}: gains of host tune; try half of them first"]
-        return parameter_text(self.changes, heading)
+        return self.autopilot.text(self.changes, heading)
 
     def to_restore(self) -> str:
         """Return the file that takes them back."""
@@ -98,12 +100,13 @@ class Tuning:
             for one in self.axes
             for setting in one.problem.structure.settings.values()
         }
-        return restoring_text(self.changes, defaults)
+        heading = [f"{self.aircraft}: back to the values before host tune"]
+        return self.autopilot.text(taken_back(self.changes, defaults), heading)
 
     def document(self) -> dict[str, Any]:
         """Return everything as plain numbers and strings."""
         return {
-            "autopilot": self.autopilot,
+            "autopilot": self.autopilot.name,
             "aircraft": self.aircraft,
             "gains": self.gains,
             "changes": [
@@ -114,6 +117,18 @@ class Tuning:
             "notes": list(self.notes),
         }
 
+    def plot(self) -> dict[str, Figure]:
+        """Return a picture of each axis with gains: steps, margins, poles and loop with bands.
+
+        Raises
+        ------
+        ControlError
+            matplotlib is missing.
+        """
+        from host.control.tuning_pictures import axis_figure
+
+        return {one.axis: axis_figure(one) for one in self.axes if one.design.gains is not None}
+
     def to_text(self) -> str:
         """Return what people read."""
         from host.control.tuning_text import tuning_lines
@@ -123,6 +138,15 @@ class Tuning:
     def __str__(self) -> str:
         """Return the text that `host tune` prints."""
         return self.to_text()
+
+    def __repr__(self) -> str:
+        """Return in a line what gains there are."""
+        named = ", ".join(f"{name} {value:g}" for name, value in self.gains.items())
+        return f"<Tuning of {self.aircraft} for {self.autopilot.name}: {named or 'no gains'}>"
+
+    def _repr_html_(self) -> str:
+        """Show what is printed; the name of an aircraft is a stranger's."""
+        return f"<pre>{html.escape(self.to_text())}</pre>"
 
 
 def tune(
@@ -143,7 +167,7 @@ def tune(
     aircraft : str
         Name or file: travel of the surfaces, servo, span, speed range.
     autopilot : str
-        ``ardupilot``.
+        ``ardupilot``, ``px4`` or ``inav``.
     parameters : mapping of str to float, optional
         Of the autopilot, as a log or a parameter file has them; its defaults without.
     airspeeds_mps : sequence of float
@@ -160,7 +184,7 @@ def tune(
     """
     if autopilot not in AUTOPILOTS:
         raise ControlError(f"autopilot '{autopilot}', expected {', '.join(AUTOPILOTS)}")
-    structure_of = AUTOPILOTS[autopilot]
+    chosen = AUTOPILOTS[autopilot]
     if isinstance(source, Sequence):
         axes, noise = axes_of_models([Path(one) for one in source]), dict[str, float]()
     else:
@@ -175,13 +199,13 @@ def tune(
         problem = Problem(
             axis,
             actuator_of(aircraft, name),
-            structure_of(name, logged, axis.trim.airspeed_mps),
+            chosen.structure(name, logged, axis.trim.airspeed_mps),
             speeds,
             loaded.scalars.get("geometry.span_m", 0.0),
             noise.get(name, 0.0),
         )
         found.append(AxisTuning(problem, design(problem, seed=seed), logged))
-    return Tuning(autopilot, loaded.title, tuple(found), tuple(notes))
+    return Tuning(chosen, loaded.title, tuple(found), tuple(notes))
 
 
 def _speeds(scalars: Mapping[str, float], axis: UncertainAxis) -> tuple[float, ...]:

@@ -12,11 +12,11 @@ if TYPE_CHECKING:
 
 FIRST_FLIGHT = (
     "First flight",
-    "  1. Load half of each P, I and D; FF and time constants whole. Keep the other file at hand.",
-    "  2. Check on the ground in FBWA: nose up by hand, the elevator goes down; right wing down,"
+    "  1. Load half of {halve}; {keep} whole. Keep the other file at hand.",
+    "  2. Check on the ground in {level}: nose up by hand, the elevator goes down; right wing down,"
     " the right aileron goes down.",
-    "  3. Take off in MANUAL. Switch to FBWA at a safe height, level, at trim speed.",
-    "  4. Look for a surface that buzzes or an aircraft that rocks: back to MANUAL, land, halve"
+    "  3. Take off in {manual}. Switch to {level} at a safe height, level, at trim speed.",
+    "  4. Look for a surface that buzzes or an aircraft that rocks: back to {manual}, land, halve"
     " again.",
     "  5. Load the whole gains when this flew well. Fly banks of 30 degrees at both ends of the"
     " speed range.",
@@ -25,14 +25,14 @@ FIRST_FLIGHT = (
 
 def tuning_lines(found: Tuning) -> Iterator[str]:
     """Return the answer line by line."""
-    yield f"{found.aircraft}, gains for {found.autopilot}"
+    yield f"{found.aircraft}, gains for {found.autopilot.name}"
     yield from (f"  note: {one}" for one in found.notes)
     for axis in found.axes:
         yield ""
         yield from _axis_lines(axis)
     if found.changes:
         yield ""
-        yield from FIRST_FLIGHT
+        yield from (line.format(**found.autopilot.words) for line in FIRST_FLIGHT)
 
 
 def _axis_lines(one: AxisTuning) -> Iterator[str]:

@@ -23,7 +23,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--aircraft", required=True, metavar="NAME",
                         help="aircraft file: travel of surfaces, servo, span, speeds")  # fmt: skip
     parser.add_argument("--for", dest="autopilot", default="ardupilot", metavar="NAME",
-                        help="autopilot: ardupilot")  # fmt: skip
+                        help="autopilot: ardupilot, px4 or inav")  # fmt: skip
     parser.add_argument("--parameters", type=Path, metavar="FILE",
                         help="the autopilot's parameters as the ground station saves them; a log"
                         " of it has its own")  # fmt: skip
@@ -33,6 +33,8 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--save", type=Path, metavar="FILE",
                         help="write changed parameters as FILE, the old ones beside it as"
                         " FILE-before")  # fmt: skip
+    parser.add_argument("--plots", type=Path, metavar="DIR",
+                        help="write a picture of each axis")  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
@@ -52,6 +54,8 @@ def run(args: argparse.Namespace) -> int:
         raise ControlError(f"--for {args.autopilot}, expected {', '.join(AUTOPILOTS)}")
     if args.save is not None:
         check_destination("--save", args.save, folder=False)
+    if args.plots is not None:
+        check_destination("--plots", args.plots, folder=True)
     announce_aircraft([args.aircraft])
     logged = read_parameters(args.parameters) if args.parameters else {}
     models = [one for one in args.source if is_model(one)]
@@ -77,4 +81,9 @@ def run(args: argparse.Namespace) -> int:
             with atomic_write(place) as unfinished:
                 unfinished.write_text(text, encoding="utf-8")
         print(f"wrote {args.save}, {before}", file=sys.stderr)
+    if args.plots is not None:
+        for axis, figure in found.plot().items():
+            with atomic_write(args.plots / f"tune_{axis}.svg") as unfinished:
+                figure.savefig(unfinished)
+        print(f"wrote {args.plots}", file=sys.stderr)
     return int(ExitCode.OK)

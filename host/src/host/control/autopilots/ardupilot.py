@@ -7,29 +7,18 @@ a share of 45, whatever angle the surface has there.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
-from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from host.arrays import Array
+from host.control.autopilots import parameter_table
+from host.control.autopilots.parameter_table import smoothing
 from host.control.autopilots.structure import Setting
 
 FULL_RAD = math.pi / 4.0  # of the controllers' output: 45 notional degrees
-
-
-@cache
-def _document() -> dict[str, Any]:
-    return tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-
-
-def settings(axis: str) -> dict[str, Setting]:
-    """Return the tuned parameters of an axis by their role."""
-    return {role: Setting(*listed) for role, listed in _document()[axis].items()}
 
 
 def speed_scaler(airspeed_mps: float, fixed: Mapping[str, float]) -> float:
@@ -58,11 +47,15 @@ class ArduPlaneLoop:
     def step(self, state: Array, angle_error: Array, rate: Array) -> tuple[Array, Array]:
         """Return the new state and the output as a share of full travel."""
         g, s, dt = self.gains, self.scaler, self.period_s
+
+        def share(name: str) -> float:
+            return smoothing(self.fixed[name], dt)
+
         demand = angle_error / g["TC"]
-        target = state[..., 0] + self._share("FLTT_hz") * (s * s * demand - state[..., 0])
-        error = state[..., 1] + self._share("FLTE_hz") * (target - s * s * rate - state[..., 1])
+        target = state[..., 0] + share("FLTT_hz") * (s * s * demand - state[..., 0])
+        error = state[..., 1] + share("FLTE_hz") * (target - s * s * rate - state[..., 1])
         slope = (error - state[..., 1]) / dt
-        derivative = state[..., 2] + self._share("FLTD_hz") * (slope - state[..., 2])
+        derivative = state[..., 2] + share("FLTD_hz") * (slope - state[..., 2])
         integral = state[..., 3] + g["I"] * error * dt
         out = (
             g["FF"] * target / (s * self.tas_ratio)
@@ -71,11 +64,6 @@ class ArduPlaneLoop:
             + integral
         )
         return np.stack([target, error, derivative, integral], axis=-1), out / FULL_RAD
-
-    def _share(self, name: str) -> float:
-        """Return what a first-order filter takes of a new value; a corner of 0 is no filter."""
-        corner_hz, dt = self.fixed[name], self.period_s
-        return dt / (dt + 1.0 / (2.0 * math.pi * corner_hz)) if corner_hz > 0.0 else 1.0
 
 
 @dataclass(frozen=True)
@@ -112,7 +100,7 @@ class ArduPlane:
     @property
     def settings(self) -> Mapping[str, Setting]:
         """Parameters that are tuned."""
-        return settings(self.axis)
+        return parameter_table.settings("ardupilot", self.axis)
 
     @property
     def gyro_filter_hz(self) -> float:
@@ -151,5 +139,4 @@ def structure(axis: str, logged: Mapping[str, float], trim_mps: float) -> ArduPl
         Airspeed of the model.
     """
     names = {key: name.format(PREFIX[axis]) for key, name in LOGGED.items()}
-    known = {key: logged[name] for key, name in names.items() if name in logged}
-    return ArduPlane(axis, {**_document()["fixed"], **known}, trim_mps)
+    return ArduPlane(axis, parameter_table.fixed("ardupilot", names, logged), trim_mps)

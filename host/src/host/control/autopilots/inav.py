@@ -1,0 +1,135 @@
+"""INAV 7 to 9, aeroplanes: attitude error to rate demand to servo, one axis.
+
+Law: src/main/flight/pid.c, servos.c (7.0.0 and 9.0.0), for small demands and without throttle or
+airspeed attenuation, as both are off by default: one set of gains at every airspeed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from typing import ClassVar
+
+import numpy as np
+
+from host.arrays import Array
+from host.control.autopilots import parameter_table
+from host.control.autopilots.parameter_table import smoothing
+from host.control.autopilots.structure import Setting
+
+FULL = 500.0  # of the axis' output: full travel
+P_DIVISOR, I_DIVISOR, D_DIVISOR, FF_DIVISOR, LEVEL_DIVISOR = 31.0, 4.0, 1905.0, 31.0, 6.56
+# A filter of two equal lags has its corner where its makers say it with each this much faster.
+PT2_SHARE = 1.0 / math.sqrt(math.sqrt(2.0) - 1.0)
+LOGGED = {
+    "gyro_filter_hz": "gyro_main_lpf_hz",
+    "dterm_hz": "dterm_lpf_hz",
+    "level_filter_hz": "fw_i_level",
+    "servo_filter_hz": "servo_lpf_hz",
+    "level_gain": "fw_p_level",
+}
+
+
+@cache
+def _servo_filter(corner_hz: float, rate_hz: float) -> tuple[Array, Array]:
+    """Return numerator and denominator of the biquad before the servo."""
+    from scipy.signal import butter
+
+    numerator, denominator = butter(2, corner_hz, fs=rate_hz)
+    return np.asarray(numerator), np.asarray(denominator)
+
+
+@dataclass(frozen=True, slots=True)
+class InavLoop:
+    """One axis with gains.
+
+    States are demand, integral, last rate, slope twice and the two of the biquad.
+    """
+
+    gains: Mapping[str, float]
+    fixed: Mapping[str, float]
+    states: int = field(default=7, init=False)
+
+    @property
+    def period_s(self) -> float:
+        """Of the PID loop."""
+        return 1.0 / self.fixed["loop_hz"]
+
+    def step(self, state: Array, angle_error: Array, rate: Array) -> tuple[Array, Array]:
+        """Return the new state and the output as a share of full travel."""
+        g, f, dt = self.gains, self.fixed, self.period_s
+        wanted = np.rad2deg(angle_error) * f["level_gain"] / LEVEL_DIVISOR
+        demand = state[..., 0] + smoothing(f["level_filter_hz"], dt) * (wanted - state[..., 0])
+        rate_degps = np.rad2deg(rate)
+        error = demand - rate_degps
+        taken = smoothing(f["dterm_hz"] * PT2_SHARE, dt)
+        first = state[..., 3] + taken * ((rate_degps - state[..., 2]) / dt - state[..., 3])
+        slope = state[..., 4] + taken * (first - state[..., 4])
+        integral = state[..., 1] + g["I"] / I_DIVISOR * error * dt
+        out = (
+            g["P"] / P_DIVISOR * error
+            + integral
+            + g["FF"] / FF_DIVISOR * demand
+            - g["D"] / D_DIVISOR * slope
+        )
+        (b0, b1, b2), (_, a1, a2) = _servo_filter(f["servo_filter_hz"], f["loop_hz"])
+        servo = b0 * out + state[..., 5]
+        kept = (b1 * out - a1 * servo + state[..., 6], b2 * out - a2 * servo)
+        new = np.stack([demand, integral, rate_degps, first, slope, *kept], axis=-1)
+        return new, servo / FULL
+
+
+@dataclass(frozen=True)
+class Inav:
+    """One axis of INAV: its parameters, and those that stay.
+
+    The attitude gain fw_p_level belongs to roll and pitch alike: it stays as it is.
+    """
+
+    axis: str
+    fixed: Mapping[str, float]
+    searched: ClassVar[tuple[str, ...]] = ("P", "D")
+
+    @property
+    def settings(self) -> Mapping[str, Setting]:
+        """Parameters that are tuned."""
+        return parameter_table.settings("inav", self.axis)
+
+    def completed(self, chosen: Mapping[str, float], feed_forward: float) -> dict[str, float]:
+        """Return every gain: FF undoes the aircraft at its trim, I restores it within a second.
+
+        INAV's own defaults of FF and I, 50 and 7, stand in that ratio.
+        """
+        known = self.settings
+        share = feed_forward * FULL / math.degrees(1.0)
+        ff, i = known["FF"].rounded(share * FF_DIVISOR), known["I"].rounded(share * I_DIVISOR)
+        return {**chosen, "FF": ff, "I": i}
+
+    @property
+    def gyro_filter_hz(self) -> float:
+        """gyro_main_lpf_hz; of second order, the slower of its kinds."""
+        return self.fixed["gyro_filter_hz"]
+
+    def loop(self, gains: Mapping[str, float], airspeed_mps: float) -> InavLoop:
+        """Return the axis with gains; no airspeed changes them."""
+        return InavLoop(dict(gains), self.fixed)
+
+
+def structure(axis: str, logged: Mapping[str, float], trim_mps: float) -> Inav:
+    """Return an axis with the parameters of `diff all`, defaults where it has none.
+
+    Parameters
+    ----------
+    axis : str
+        ``roll`` or ``pitch``.
+    logged : mapping of str to float
+        Parameters by name.
+    trim_mps : float
+        Airspeed of the model; no gain follows it.
+    """
+    fixed = parameter_table.fixed("inav", LOGGED, logged)
+    if logged.get("looptime", 0.0) > 0.0:
+        fixed["loop_hz"] = 1e6 / logged["looptime"]
+    return Inav(axis, fixed)

@@ -1,0 +1,43 @@
+"""The autopilots that gains can be made for: law, words and file of each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from host.control.autopilots import ardupilot, inav, parameter_table, px4
+from host.control.autopilots.structure import Structure
+from host.control.parameter_file import Writer, cli_text, mission_planner_text, qgroundcontrol_text
+
+
+@dataclass(frozen=True)
+class Autopilot:
+    """One autopilot.
+
+    Attributes
+    ----------
+    name : str
+    structure : callable
+        From an axis, parameters by name and the airspeed of the model.
+    text : callable
+        From changes and a heading to the file that its ground station loads.
+    """
+
+    name: str
+    structure: Callable[[str, Mapping[str, float], float], Structure]
+    text: Writer
+
+    @property
+    def words(self) -> Mapping[str, str]:
+        """What the first flight's page calls its modes and gains."""
+        return parameter_table.words(self.name)
+
+
+AUTOPILOTS = {
+    one.name: one
+    for one in (
+        Autopilot("ardupilot", ardupilot.structure, mission_planner_text),
+        Autopilot("px4", px4.structure, qgroundcontrol_text),
+        Autopilot("inav", inav.structure, cli_text),
+    )
+}

@@ -1,0 +1,53 @@
+"""The file beside an autopilot's law: its parameters, their ranges, what its modes are called."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from host.control.autopilots.structure import Setting
+
+
+@cache
+def _document(autopilot: str) -> dict[str, Any]:
+    place = Path(__file__).with_name(f"{autopilot}.toml")
+    return tomllib.loads(place.read_text(encoding="utf-8"))
+
+
+def settings(autopilot: str, axis: str) -> dict[str, Setting]:
+    """Return the tuned parameters of an axis by their role."""
+    return {role: Setting(*listed) for role, listed in _document(autopilot)[axis].items()}
+
+
+def fixed(
+    autopilot: str, names: Mapping[str, str], logged: Mapping[str, float]
+) -> dict[str, float]:
+    """Return the parameters that stay: a log's own, defaults where it has none.
+
+    Parameters
+    ----------
+    autopilot : str
+    names : mapping of str to str
+        The autopilot's own name of each.
+    logged : mapping of str to float
+        Parameters by the autopilot's names.
+    """
+    known = {key: float(logged[name]) for key, name in names.items() if name in logged}
+    return {**_document(autopilot)["fixed"], **known}
+
+
+def words(autopilot: str) -> Mapping[str, str]:
+    """Return what the first flight's page calls its modes and gains."""
+    found: Mapping[str, str] = _document(autopilot)["words"]
+    return found
+
+
+def smoothing(corner_hz: float, period_s: float) -> float:
+    """Return what a first-order filter takes of a new value; a corner of 0 is no filter."""
+    if corner_hz <= 0.0:
+        return 1.0
+    return period_s / (period_s + 1.0 / (2.0 * math.pi * corner_hz))

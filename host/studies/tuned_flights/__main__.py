@@ -1,0 +1,192 @@
+"""Gains of `host tune` flown on the twin's aircraft: stability, margins, steps, gusts.
+
+    python -m studies.tuned_flights --aircraft-drawn 200
+
+One flight of card `demo` is identified and tuned. Its gains are fixed, then flown on aircraft drawn
+from the tolerances of the aircraft file around its truth, and on linear ones drawn from the
+answer's covariance; the autopilot's default gains beside.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import sys
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as `host identify` does
+
+from concurrent.futures import Executor, ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from host.aircraft.linear_aircraft import load
+from host.aircraft.trim import solve
+from host.arrays import Array
+from host.compiled import prefer_machine_code
+from host.control import AUTOPILOTS, Tuning, tune
+from host.control.actuator import PULSE_PERIOD_S
+from host.control.autopilots.structure import Structure
+from host.control.scenarios import draw as draw_scenarios
+from host.sysid.pipeline import identify
+from host.twin.flight.draws import draw, true_airframe
+from host.twin.virtual import virtual_flight
+
+from studies.study_table import Table, markdown
+from studies.tuned_flights.closed_loop_flight import AXES, ClosedLoop, Demand, Flown, fly
+from studies.tuned_flights.measured_margins import computed, measured
+from studies.tuned_flights.step_figures import moving_at_the_end, step_figures
+
+AIRCRAFT = "ultrastick25e"
+SPEEDS_MPS = (13.0, 17.0, 20.5)  # ends and trim of the aircraft file
+STEPS = {"bank 30 deg": Demand(bank_rad=np.radians(30.0)),
+         "pitch 8 deg": Demand(pitch_rad=np.radians(8.0))}  # fmt: skip
+GUSTS_MPS = (0.0, 1.0, 2.0)
+SERVO_SHARE, BACK_SHARE = 0.5, 0.03  # servo at half speed, CG 3 % of the chord back
+GYRO_NOISE_RADPS = 0.002
+PROCESSES = 2
+DEFAULT_PART = 4  # the default gains fly on every fourth of the aircraft
+FIRST_SEED = 48_000
+COLUMNS = ("case", "flights", "lost", "moving at the end", "rise s", "overshoot %", "settled s",
+           "surface rad/s rms", "dB off", "deg off", "95 % within")  # fmt: skip
+Gains = Mapping[str, Mapping[str, float]]
+
+
+def tuned(autopilot: str, seed: int) -> Tuning:
+    """Return the gains of one flight of card `demo`, identified with its aircraft file."""
+    flight = virtual_flight("demo", seed)
+    return tune(identify(flight.table, aircraft=AIRCRAFT), aircraft=AIRCRAFT, autopilot=autopilot)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Fly and print."""
+    parser = argparse.ArgumentParser(prog="python -m studies.tuned_flights", description=__doc__)
+    parser.add_argument("--autopilot", choices=tuple(AUTOPILOTS), default="ardupilot")
+    parser.add_argument("--aircraft-drawn", type=int, default=200)
+    parser.add_argument("--first", type=int, default=FIRST_SEED)
+    asked = parser.parse_args(arguments)
+    found = tuned(asked.autopilot, asked.first)
+    print(found.to_text(), end="\n\n")
+    missing = [one.axis for one in found.axes if one.design.gains is None]
+    if missing or len(found.axes) < len(AXES):
+        print(f"no gains: {', '.join(missing) or 'an axis'}")
+        return 1
+    laws = {one.axis: one.problem.structure for one in found.axes}
+    sets = {
+        "tuned": {one.axis: dict(one.design.gains or {}) for one in found.axes},
+        "default": {a: {r: s.default for r, s in laws[a].settings.items()} for a in AXES},
+    }
+    drawn = from_covariance(found, asked.aircraft_drawn, asked.first)
+    print(f"{drawn[0]} of {drawn[1]} linear aircraft of the answer's covariance are unstable\n")
+    with ProcessPoolExecutor(PROCESSES, initializer=prefer_machine_code) as processes:
+        for (name, gains), part in zip(sets.items(), (1, DEFAULT_PART), strict=True):
+            seeds = range(asked.first, asked.first + max(asked.aircraft_drawn // part, 1))
+            flown = Flights(Craft(laws, gains), seeds, processes)
+            print(markdown(flown.table(f"{asked.autopilot}, {name} gains")), flush=True)
+    return 0
+
+
+def from_covariance(found: Tuning, count: int, seed: int) -> tuple[int, int]:
+    """Return how many linear aircraft of a fresh drawing are unstable, of how many."""
+    bad = total = 0
+    for one in found.axes:
+        scenarios = draw_scenarios(one.problem, seed=seed + 7, count=count)
+        stable = scenarios.stable(one.design.gains or {})
+        bad, total = bad + int(np.sum(stable == 0)), total + len(stable)
+    return bad, total
+
+
+@dataclass(frozen=True)
+class Craft:
+    """Aircraft drawn from the tolerances of their file, with laws and gains."""
+
+    laws: Mapping[str, Structure]
+    gains: Gains
+
+    def loop(
+        self, seed: int, speed_mps: float, servo: float = 1.0, back: float = 0.0
+    ) -> ClosedLoop:
+        """Return one of them, its servo slower by a share, its CG back by a share of the chord."""
+        rng = np.random.default_rng(seed)
+        aircraft = load(AIRCRAFT)
+        frame = true_airframe(aircraft, draw(aircraft, rng, tolerances=True))
+        frame = frame._replace(
+            servo_bandwidth_radps=servo * frame.servo_bandwidth_radps,
+            servo_rate_radps=servo * frame.servo_rate_radps,
+            cg_m=frame.cg_m - np.array([back * frame.chord_m, 0.0, 0.0]),
+        )
+        pulse_s = float(rng.uniform(0.0, PULSE_PERIOD_S))
+        return ClosedLoop(frame, solve(frame, speed_mps), self.laws, self.gains, pulse_s)
+
+    def fly(
+        self, seed: int, *, speed: float, demand: Demand, gusts: float, changes: tuple[float, ...]
+    ) -> Flown:
+        """Return the flight of one."""
+        loop = self.loop(seed, speed, *changes)
+        noise = GYRO_NOISE_RADPS if gusts else 0.0
+        return fly(loop, demand, turbulence_mps=gusts, gyro_noise_radps=noise, seed=seed)
+
+    def off(self, seed: int, *, axis: str) -> Array:
+        """Return measured minus computed gain (dB) and phase margin (deg) of one."""
+        loop = self.loop(seed, SPEEDS_MPS[1])
+        flown, known = measured(loop, axis), computed(loop, axis)
+        return np.array([
+            float(flown.gain_db[0] - known.gain_db[0]),
+            float(flown.phase_deg[0] - known.phase_deg[0]),
+        ])  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Flights:
+    """All flights of one set of gains."""
+
+    craft: Craft
+    seeds: range
+    processes: Executor
+
+    def table(self, title: str) -> Table:
+        """Return one row a case: flights lost or still moving, figures of the step."""
+        return Table(title, COLUMNS, tuple(tuple(row) for row in self._rows()))
+
+    def _rows(self) -> Iterator[list[str | int | float]]:
+        for speed in SPEEDS_MPS:
+            for step in STEPS:
+                for gusts in GUSTS_MPS:
+                    yield self._row(
+                        f"{step}, {speed:g} m/s, gusts {gusts:g} m/s", step, speed, gusts
+                    )
+        for name, changes in (("servo at half speed", (SERVO_SHARE, 0.0)),
+                              ("CG 3 % back", (1.0, BACK_SHARE))):  # fmt: skip
+            for step in STEPS:
+                case = f"{step}, {SPEEDS_MPS[1]:g} m/s, {name}"
+                yield self._row(case, step, SPEEDS_MPS[1], 0.0, changes)
+        for axis in AXES:
+            found = self.processes.map(partial(self.craft.off, axis=axis), self.seeds)
+            off = np.array(list(found))
+            within = np.nanquantile(np.abs(off), 0.95, axis=0)
+            lost = int(np.isnan(off).any(axis=1).sum())
+            yield [f"margins, {axis}, {SPEEDS_MPS[1]:g} m/s", len(off), lost, *[math.nan] * 5,
+                   *np.nanmean(off, axis=0).tolist(),
+                   f"{within[0]:.2f} dB, {within[1]:.1f} deg"]  # fmt: skip
+
+    def _row(
+        self, case: str, step: str, speed: float, gusts: float, changes: tuple[float, ...] = ()
+    ) -> list[str | int | float]:
+        demand = STEPS[step]
+        one = partial(self.craft.fly, speed=speed, demand=demand, gusts=gusts, changes=changes)
+        flown = list(self.processes.map(one, self.seeds))
+        kept = [one for one in flown if not one.lost]
+        figures = np.array([step_figures(one, demand) for one in kept])
+        with warnings.catch_warnings():  # a step that none settles has no median
+            warnings.simplefilter("ignore", RuntimeWarning)
+            middle = np.nanmedian(figures, axis=0).tolist()
+        moving = math.nan if gusts else sum(moving_at_the_end(one) for one in kept)
+        return [case, len(flown), len(flown) - len(kept), moving, *middle, math.nan, math.nan, ""]
+
+
+if __name__ == "__main__":
+    prefer_machine_code()
+    sys.exit(main())
