@@ -17,7 +17,6 @@ from tests.mutants.judge import (
     INVALID,
     KILLED,
     SAME,
-    SURVIVED,
     MutantError,
     judge_file,
     survivor_lines,
@@ -105,7 +104,7 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     print(
         f"{'file':24}{'judged':>14}{'killed':>8}{'of':>6}{'share':>8}"
-        f"{'same':>7}{'invalid':>9}{'CPU s':>8}"
+        f"{'same':>7}{'proved':>8}{'invalid':>9}{'CPU s':>8}"
     )
     below, broken = [], []
     for short in asked.names or SHORT:
@@ -118,10 +117,9 @@ def main(arguments: list[str] | None = None) -> int:
             broken.append(short)
             continue
         killed = result.count(KILLED)
-        counted = killed + result.count(SURVIVED)
         print(
-            f"{short:24}{result.judged:>14}{killed:>8}{counted:>6}{result.share:>8.1%}"
-            f"{result.count(SAME):>7}{result.count(INVALID):>9}"
+            f"{short:24}{result.judged:>14}{killed:>8}{result.counted:>6}{result.share:>8.1%}"
+            f"{result.count(SAME):>7}{result.proved:>8}{result.count(INVALID):>9}"
             f"{_processor_s() - start_s:>8.0f}",
             flush=True,
         )

@@ -6,8 +6,9 @@ compiler finds the same cannot be told apart by any test. A header's object is t
 files that include it, at -O0, for optimising them takes four times as long; only what lives is
 compared at -O2 too. A mutant is killed when a test case fails, the suite crashes or runs for twenty
 times its processor time, 0.3 s at least. What survives so is compared with the original's
-object at other levels of optimisation: where one is equal, the program is the same. The rest is
-built once more under address and undefined-behaviour sanitizers, as `pio test -e native` does.
+object at other levels of optimisation, and as clang makes it: where one is equal, the program is
+the same. The rest is built once more under address and undefined-behaviour sanitizers, as
+`pio test -e native` does. What lives then and has a proof in `proofs.toml` is the same program too.
 """
 
 from __future__ import annotations
@@ -17,10 +18,12 @@ import json
 import os
 import re
 import resource
+import shutil
 import signal
 import subprocess
 import sys
 import tempfile
+import tomllib
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -32,7 +35,9 @@ ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
 SUITES = ROOT / "tests" / "firmware"
 OUT = ROOT / "build" / "mutants"
+PROOFS = Path(__file__).resolve().parent / "proofs.toml"
 
+CLANG = "clang++"  # what fuzzing has; without it more survives
 COMPILER = os.environ.get("CXX", "g++")
 PLAIN = (
     "-std=gnu++14",
@@ -147,6 +152,7 @@ class Judge:
         self._headers = _headers()
         self._sanitizing = Lock()
         self._originals: dict[tuple[str, ...], str] = {}
+        self._by_clang: bytes | None = None
         self._prepare(self._plain)
 
     def _prepare(self, flags: tuple[str, ...]) -> None:
@@ -236,7 +242,11 @@ class Judge:
             flags = _plain_at(level)
             if self._content_of(mutant.text, folder, flags) == self._original(flags):
                 return True
-        return False
+        if self._is_header or shutil.which(CLANG) is None:
+            return False
+        if self._by_clang is None:
+            self._by_clang = _clang_object(self.source.read_text(encoding="utf-8"))
+        return _clang_object(mutant.text) == self._by_clang
 
     def _original(self, flags: tuple[str, ...]) -> str:
         if flags not in self._originals:
@@ -364,6 +374,14 @@ def includes(path: Path) -> set[Path]:
     return {word.resolve() for word in words if word.is_file()}
 
 
+def _clang_object(text: str) -> bytes:
+    # From a pipe: an object of clang's holds the name of its source.
+    command = [CLANG, *PLAIN, "-x", "c++", "-c", "-", "-o", "-"]
+    return subprocess.run(
+        command, cwd=ROOT, input=text.encode(), capture_output=True, check=True
+    ).stdout
+
+
 def _plain_at(level: str) -> tuple[str, ...]:
     return tuple(level if flag == "-O2" else flag for flag in PLAIN)
 
@@ -385,8 +403,9 @@ class Result:
 
     name: str
     verdicts: dict[str, str]
-    survivors: list[Mutant]
+    survivors: list[Mutant]  # without a proof
     made: int
+    proved: int = 0
 
     @property
     def judged(self) -> str:
@@ -401,8 +420,12 @@ class Result:
     @property
     def share(self) -> float:
         """Killed of those that count."""
-        counted = self.count(KILLED) + self.count(SURVIVED)
-        return self.count(KILLED) / counted if counted else 0.0
+        return self.count(KILLED) / self.counted if self.counted else 0.0
+
+    @property
+    def counted(self) -> int:
+        """Mutants that are another program, as far as is known."""
+        return self.count(KILLED) + len(self.survivors)
 
 
 def judge_file(
@@ -442,7 +465,20 @@ def judge_file(
                     )  # fmt: skip
                     _progress(name, at + 1, len(waiting))
     known = {mutant.key: verdicts[mutant.key] for mutant in mutants}
-    return Result(name, known, [m for m in mutants if known[m.key] == SURVIVED], len(made))
+    proofs = proofs_of(name)
+    for stale in proofs - {(one.line, one.was, one.now) for one in made}:
+        raise MutantError(f"{name}: a proof in {PROOFS.name} is of no mutant: {stale}")
+    survived = [one for one in mutants if known[one.key] == SURVIVED]
+    left = [one for one in survived if (one.line, one.was, one.now) not in proofs]
+    return Result(name, known, left, len(made), len(survived) - len(left))
+
+
+def proofs_of(name: str) -> set[tuple[int, str, str]]:
+    """Return line, text before and text after of the mutants of a file that are proved the same."""
+    rows = tomllib.loads(PROOFS.read_text(encoding="utf-8"))["proof"]
+    return {
+        (row["line"], row["was"], now) for row in rows if row["file"] == name for now in row["now"]
+    }
 
 
 def _progress(name: str, done: int, whole: int) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import shutil
+import tomllib
 from pathlib import Path
 
 import pytest
 
 from tests.mutants import judge
+from tests.mutants.__main__ import FILES
 
 SOURCE = """\
 #include <stdint.h>
@@ -175,3 +177,39 @@ def test_a_run_goes_on_and_survivors_are_judged_again_by_a_new_suite(tree: Path)
     second = judge.judge_file("core/clamp.cpp", ("test_clamp",), jobs=1, out=tree / "notes")
     assert second.share > first.share
     assert not any("value + 3" in one.was for one in second.survivors)
+
+
+def test_what_is_proved_the_same_program_does_not_count(
+    tree: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    proofs = tree / "proofs.toml"
+    proofs.write_text("proof = []")
+    monkeypatch.setattr(judge, "PROOFS", proofs)
+    one = ("core/clamp.cpp", ("test_clamp",))
+    before = judge.judge_file(*one, jobs=1, out=tree / "notes")
+    left = next(mutant for mutant in before.survivors if mutant.was.startswith("return"))
+    row = f"""\
+[[proof]]
+file = "core/clamp.cpp"
+line = {left.line}
+was = "{left.was}"
+now = ["{left.now}"]
+"""
+    proofs.write_text(row)
+    after = judge.judge_file(*one, jobs=1, out=tree / "notes")
+    assert (before.proved, after.proved) == (0, 1)
+    assert after.counted == before.counted - 1
+    assert left not in after.survivors
+    proofs.write_text(row.replace(f"line = {left.line}", "line = 1"))
+    with pytest.raises(judge.MutantError, match="is of no mutant"):
+        judge.judge_file(*one, jobs=1, out=tree / "notes")
+
+
+def test_each_proof_stands_at_its_line_and_says_why() -> None:
+    for row in tomllib.loads(judge.PROOFS.read_text(encoding="utf-8"))["proof"]:
+        assert row["file"] in FILES
+        lines = (judge.FIRMWARE / row["file"]).read_text(encoding="utf-8").splitlines()
+        if row["was"]:
+            assert lines[row["line"] - 1].strip() == row["was"], row
+        assert row["now"]
+        assert len(row["because"].split()) >= 4, row

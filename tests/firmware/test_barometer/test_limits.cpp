@@ -105,6 +105,22 @@ TEST_CASE("barometer: asked at once, then each second at the other address") {
   }
 }
 
+TEST_CASE("barometer: asked at once at power-on too, when the clock has just begun") {
+  Bench bench;
+  bench.now_us = 0;
+  CHECK(bench.after(12) == BaroEvent::kNone);
+  CHECK_EQ(bench.bus.starts, 1);
+  CHECK(bench.asks(0x77, 0xD0, 1));
+}
+
+TEST_CASE("barometer: the numbers by which the log tells why it is lost") {
+  CHECK_EQ(static_cast<uint8_t>(BaroStatus::kOk), 0);
+  CHECK_EQ(static_cast<uint8_t>(BaroStatus::kSilent), 1);
+  CHECK_EQ(static_cast<uint8_t>(BaroStatus::kStuck), 2);
+  CHECK_EQ(static_cast<uint8_t>(BaroStatus::kOtherChip), 3);
+  CHECK_EQ(static_cast<uint8_t>(BaroStatus::kCoefficients), 4);
+}
+
 TEST_CASE("barometer: a BMP085's measurement, both commands and waits of its data sheet") {
   Bench bench;
   bench.baro.measure();  // before there is one: forgotten

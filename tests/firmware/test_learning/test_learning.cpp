@@ -84,6 +84,30 @@ TEST_CASE("no sum overflows in 60 s, and then nothing is added") {
   CHECK_EQ(sums.at(0, 0).re, INT32_C(-1) * 2999 * (INT32_C(1) << 19));
 }
 
+TEST_CASE("a second start begins anew: the same sums as those of a first one") {
+  const core::AxisCard card = core::flash_load(&cases::kPitchCard);
+  const int16_t rows[][core::kMostSignals] = {
+      {5, -3, 200, 0, 0}, {70, 9, -1000, 0, 0}, {-8, 1, 30, 0, 0}};
+  core::FourierSums fresh;
+  core::FourierSums again;
+  REQUIRE(again.start(card));
+  REQUIRE(again.take(card, rows[1]));
+  REQUIRE(again.take(card, rows[0]));
+  REQUIRE(fresh.start(card));
+  REQUIRE(again.start(card));
+  CHECK_EQ(again.count(), 0);
+  for (const auto& row : rows) {
+    REQUIRE(fresh.take(card, row));
+    REQUIRE(again.take(card, row));
+  }
+  CHECK_EQ(again.count(), 3);
+  for (uint8_t signal = 0; signal < again.signals(); ++signal) {
+    CHECK_EQ(again.last(signal), fresh.last(signal));
+    CHECK_EQ(again.at(1, signal).re, fresh.at(1, signal).re);
+    CHECK_EQ(again.at(1, signal).im, fresh.at(1, signal).im);
+  }
+}
+
 TEST_CASE("a card that wants more sums than there are is refused") {
   core::AxisCard card = core::flash_load(&cases::kRollCard);
   core::FourierSums sums;

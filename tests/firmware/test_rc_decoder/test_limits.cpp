@@ -387,3 +387,60 @@ TEST_CASE("the first edge behind a gap begins no pulse: how long the line was lo
   line.pulse(20 * kMs);
   CHECK(line.decoder.changes() != changes);
 }
+
+TEST_CASE("a pulse is fresh for 45 ms to the tick, wherever the clock stands") {
+  for (uint32_t phase = 0; phase < 3000; ++phase) {
+    RcDecoder decoder;
+    const uint32_t start_ticks = phase * 1048573U;  // all of the 32 bits, and around their end
+    decoder.edge(start_ticks, 0, false);
+    const uint32_t rise_ticks = start_ticks + 20 * kMs;
+    decoder.edge(rise_ticks, 1, false);
+    decoder.edge(rise_ticks + kWidth, 0, false);
+    decoder.poll(rise_ticks + kWidth + RcDecoder::kLowAfterTicks);
+    RcDecoder early = decoder;
+    early.poll(rise_ticks + RcDecoder::kFreshTicks - 1);
+    REQUIRE(early.fresh() == 1);
+    RcDecoder last = decoder;
+    last.poll(rise_ticks + RcDecoder::kFreshTicks);
+    REQUIRE(last.fresh() == 1);
+    decoder.poll(rise_ticks + RcDecoder::kFreshTicks + 1);
+    REQUIRE(decoder.fresh() == 0);
+    decoder.poll(rise_ticks + RcDecoder::kLostTicks + 1);
+    REQUIRE(decoder.valid() == 0);
+  }
+}
+
+TEST_CASE("one late look takes all that is over: fresh and steady at once") {
+  Line line;
+  line.frames(5);
+  const uint8_t changes = line.decoder.changes();
+  line.decoder.poll(line.rise_ticks + RcDecoder::kUnsteadyTicks + 1);
+  CHECK_EQ(line.decoder.steady(), 0);
+  CHECK_EQ(line.decoder.fresh(), 0);
+  CHECK_EQ(line.decoder.valid(), 1);
+  CHECK_EQ(line.decoder.changes(), changes + 2);
+}
+
+TEST_CASE("pulses too short to be used are no fast receiver where the low before each is 2 ms") {
+  const uint32_t lows_ticks[] = {RcDecoder::kLowBeforeTicks, RcDecoder::kLowBeforeTicks + 1000};
+  for (const uint32_t low_ticks : lows_ticks) {
+    CHECK_EQ(refused_hz(600, 1000, low_ticks), 0);
+  }
+}
+
+TEST_CASE("lines beyond the fifth are nobody's") {
+  Line line;
+  line.frames(5);
+  const uint8_t changes = line.decoder.changes();
+  const uint16_t glitches = line.decoder.glitches();
+  for (uint8_t i = 0; i < 6; ++i) {
+    const uint32_t at = line.rise_ticks + 4 * kMs + i * 3 * kMs;
+    line.decoder.edge(at, 0b1110'0000, false);
+    line.decoder.edge(at + kWidth, 0, false);
+    line.decoder.poll(at + kWidth + RcDecoder::kLowAfterTicks);
+  }
+  CHECK_EQ(line.decoder.changes(), changes);
+  CHECK_EQ(line.decoder.glitches(), glitches);
+  CHECK_EQ(line.decoder.valid(), 1);
+  CHECK(!line.decoder.waiting());
+}
