@@ -11,6 +11,7 @@ from host.arrays import Array
 from host.control import ControlError, read_parameters
 from host.control.actuator import Actuator, actuator_of
 from host.control.autopilots.known import AUTOPILOTS
+from host.control.bandwidth_costs import bandwidth_costs, known
 from host.control.disturbances import gyro_noise_radps
 from host.control.loop_design import Design, design, feed_forward, search
 from host.control.parameter_file import Change, taken_back
@@ -174,3 +175,38 @@ def test_what_is_drawn_is_there_for_axes_with_gains_alone() -> None:
     assert Tuning(AUTOPILOTS["px4"], "mine", (refused,), ()).plot() == {}
     assert "&lt;b&gt;mine" in found._repr_html_()
     assert "RLL_RATE_P 0.12" in repr(found)
+
+
+def test_a_derivative_that_is_known_costs_nothing_and_the_others_follow() -> None:
+    covariance = np.array([[4.0, 3.0], [3.0, 9.0]])
+    # Of a normal pair: the variance of the second, given the first, is 9 - 9 / 4.
+    assert known(covariance, 0) == pytest.approx(np.array([[0.0, 0.0], [0.0, 6.75]]))
+
+
+def test_the_control_power_of_a_roll_axis_costs_what_its_interval_says() -> None:
+    asked = problem(0.0)
+    axis = replace(asked.axis, covariance=np.diag([0.0, (0.2 * 150.0) ** 2]))
+    gains = asked.structure.completed({"P": 0.12, "D": 0.0, "TC": 0.5}, 0.17)
+    ((name, share),) = bandwidth_costs(replace(asked, axis=axis), gains)
+    assert name == "L_da"
+    # The loop's gain is L_da: of sixty draws the largest lies 2.3 standard deviations up.
+    assert 0.3 < share < 0.6
+
+
+def test_elevons_have_half_the_travel_and_twice_the_gains() -> None:
+    plain = AUTOPILOTS["ardupilot"].structure("roll", {}, 15.0)
+    elevons = AUTOPILOTS["ardupilot"].structure(
+        "roll", {"SERVO1_FUNCTION": 77.0, "SERVO2_FUNCTION": 78.0}, 15.0
+    )
+    gains = {"P": 0.1, "I": 0.1, "D": 0.0, "FF": 0.2, "TC": 0.5}
+    state = np.zeros(4)
+    whole = plain.loop(gains, 15.0).step(state, np.array(0.2), np.array(0.0))[1]
+    half = elevons.loop(gains, 15.0).step(state, np.array(0.2), np.array(0.0))[1]
+    assert float(half) == pytest.approx(0.5 * float(whole))
+    chosen = {"P": 0.1, "D": 0.0, "TC": 0.5}
+    ratio = elevons.completed(chosen, 0.1)["FF"] / plain.completed(chosen, 0.1)["FF"]
+    assert ratio == pytest.approx(2.0, rel=0.02)
+    tail = AUTOPILOTS["ardupilot"].structure("roll", {"SERVO2_FUNCTION": 79.0}, 15.0)
+    assert float(tail.loop(gains, 15.0).step(state, np.array(0.2), np.array(0.0))[1]) == float(
+        whole
+    )

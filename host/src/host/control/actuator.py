@@ -31,6 +31,8 @@ class Actuator:
     rate_limit_radps : float
     delay_s : float
         Between the output's calculation and the servo, mean; `delay_sd_s` the same.
+    servo_known : bool
+        Whether the aircraft file has the servo's bandwidth.
     """
 
     surface: str
@@ -41,6 +43,7 @@ class Actuator:
     rate_limit_radps: float
     delay_s: float
     delay_sd_s: float
+    servo_known: bool = True
 
     def drawn(self, rng: np.random.Generator, count: int) -> Array:
         """Return travel (rad), bandwidth (Hz) and delay (s) of each, shape (count, 3)."""
@@ -94,4 +97,5 @@ def actuator_of(aircraft: str, axis: str, travel_rad: float | None = None) -> Ac
         rate,
         0.5 * PULSE_PERIOD_S,
         float(np.hypot(errors["servo_delay_s"].sigma(surface), PULSE_PERIOD_S / np.sqrt(12.0))),
+        instrument.servo_hz > 0.0,
     )

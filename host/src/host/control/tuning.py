@@ -8,9 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from host.aircraft.file import load_measured
+from host.constants import NORMAL_95
 from host.control.actuator import actuator_of
 from host.control.autopilots.known import AUTOPILOTS, Autopilot
+from host.control.bandwidth_costs import bandwidth_costs
 from host.control.control_error import ControlError
 from host.control.disturbances import gyro_noise_radps
 from host.control.loop_design import Design, design
@@ -32,6 +36,7 @@ class AxisTuning:
     problem: Problem
     design: Design
     before: Mapping[str, float]
+    costs: tuple[tuple[str, float], ...] = ()
 
     @property
     def axis(self) -> str:
@@ -101,6 +106,8 @@ class Tuning:
             for setting in one.problem.structure.settings.values()
         }
         heading = [f"{self.aircraft}: back to the values before host tune"]
+        if any(one.old is None for one in self.changes):
+            heading.append("nobody named the old values: these are the autopilot's defaults")
         return self.autopilot.text(taken_back(self.changes, defaults), heading)
 
     def document(self) -> dict[str, Any]:
@@ -113,6 +120,7 @@ class Tuning:
                 {"name": c.name, "new": c.new, "old": c.old, "unit": c.unit} for c in self.changes
             ],
             "margins": self.margins,
+            "bandwidth_costs": {one.axis: dict(one.costs) for one in self.axes},
             "refused": [one.axis for one in self.axes if one.design.gains is None],
             "notes": list(self.notes),
         }
@@ -192,7 +200,6 @@ def tune(
         noise = {name: _noise(source, name) for name in axes}
     loaded = load_measured(aircraft)
     logged = dict(parameters or {})
-    notes = list(_notes(axes, known=bool(logged)))
     found = []
     for name, axis in axes.items():
         speeds = tuple(airspeeds_mps) or _speeds(loaded.scalars, axis)
@@ -204,8 +211,11 @@ def tune(
             loaded.scalars.get("geometry.span_m", 0.0),
             noise.get(name, 0.0),
         )
-        found.append(AxisTuning(problem, design(problem, seed=seed), logged))
-    return Tuning(chosen, loaded.title, tuple(found), tuple(notes))
+        best = design(problem, seed=seed)
+        costs = bandwidth_costs(problem, best.gains) if best.gains else []
+        found.append(AxisTuning(problem, best, logged, tuple(costs)))
+    flown = () if isinstance(source, Sequence) else _airspeeds_mps(source)
+    return Tuning(chosen, loaded.title, tuple(found), tuple(_notes(found, logged, flown)))
 
 
 def _speeds(scalars: Mapping[str, float], axis: UncertainAxis) -> tuple[float, ...]:
@@ -220,16 +230,52 @@ def _noise(identified: Identification, axis: str) -> float:
     return gyro_noise_radps([one for one in columns if one is not None])
 
 
-def _notes(axes: Mapping[str, UncertainAxis], *, known: bool) -> Iterator[str]:
-    for missing in [name for name in ("roll", "pitch") if name not in axes]:
+def _airspeeds_mps(identified: Identification) -> tuple[float, ...]:
+    """Return the least and largest airspeed of the maneuvers."""
+    flown: list[float] = []
+    for flight in identified.flights:
+        columns = flight.recorded
+        airspeed = columns.get("airspeed_mps")
+        if airspeed is None:
+            continue
+        for one in flight.maneuvers:
+            inside = (columns["t_s"] >= one.start_s) & (columns["t_s"] <= one.end_s)
+            flown += airspeed[inside & np.isfinite(airspeed)].tolist()
+    return (min(flown), max(flown)) if flown else ()
+
+
+def _notes(
+    axes: Sequence[AxisTuning], logged: Mapping[str, float], flown_mps: Sequence[float]
+) -> Iterator[str]:
+    for missing in {"roll", "pitch"} - {one.axis for one in axes}:
         yield f"no gains for {missing}: the answer has no model of it"
-    if any(not one.correlated for one in axes.values()):
+    if any(not one.problem.axis.correlated for one in axes):
         yield "a saved model has no correlations: its derivatives are drawn independently"
-    if not known:
+    settings = [s for one in axes for s in one.problem.structure.settings.values()]
+    own = [s for s in settings if s.name in logged]
+    if not own:
         yield (
             "filters, loop rate and speeds are the autopilot's defaults: name its parameters with"
             " --parameters, or a log that has them"
         )
+    for one in own:
+        value = logged[one.name]
+        if not one.lowest <= value <= one.highest:
+            yield f"{one.name} is {value:g}, documented {one.lowest:g} to {one.highest:g}"
+    speeds = sorted({v for one in axes for v in one.problem.airspeeds_mps})
+    beyond = [f"{v:.1f}" for v in speeds if flown_mps and not flown_mps[0] <= v <= flown_mps[-1]]
+    if beyond:
+        yield (
+            f"not flown at {', '.join(beyond)} m/s: derivatives of {flown_mps[0]:.1f} to"
+            f" {flown_mps[-1]:.1f} m/s are scaled with the airspeed"
+        )
+    for one_axis in axes:
+        drive = one_axis.problem.actuator
+        if not drive.servo_known:
+            yield (
+                f"the {drive.surface}'s servo is not in the aircraft file: {drive.bandwidth_hz:.1f}"
+                f" Hz +- {100.0 * NORMAL_95 * drive.bandwidth_share:.0f} % stand for it"
+            )
 
 
 def _worst(one: AxisTuning) -> Iterator[tuple[str, float]]:

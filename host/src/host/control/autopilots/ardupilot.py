@@ -7,6 +7,7 @@ a share of 45, whatever angle the surface has there.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -18,6 +19,8 @@ from host.control.autopilots import parameter_table
 from host.control.autopilots.parameter_table import smoothing
 from host.control.autopilots.structure import Setting
 
+ELEVONS, V_TAIL = {77, 78}, {79, 80}  # SERVOn_FUNCTION
+MIXING_GAIN = 0.5  # its default
 FULL_RAD = math.pi / 4.0  # of the controllers' output: 45 notional degrees
 
 
@@ -36,6 +39,7 @@ class ArduPlaneLoop:
     gains: Mapping[str, float]
     scaler: float
     fixed: Mapping[str, float]
+    share: float = 1.0
     tas_ratio: float = 1.0
     states: int = field(default=4, init=False)
 
@@ -63,7 +67,7 @@ class ArduPlaneLoop:
             + g["D"] * derivative
             + integral
         )
-        return np.stack([target, error, derivative, integral], axis=-1), out / FULL_RAD
+        return np.stack([target, error, derivative, integral], axis=-1), out / FULL_RAD * self.share
 
 
 @dataclass(frozen=True)
@@ -77,11 +81,14 @@ class ArduPlane:
         Filters, loop rate and speeds; the log's own where it has them.
     trim_mps : float
         Airspeed of the model.
+    share : float
+        Of the surface's travel that full output is, below 1 where a mixer halves it.
     """
 
     axis: str
     fixed: Mapping[str, float]
     trim_mps: float
+    share: float = 1.0
     searched: ClassVar[tuple[str, ...]] = ("P", "D", "TC")
 
     def completed(self, chosen: Mapping[str, float], feed_forward: float) -> dict[str, float]:
@@ -91,7 +98,7 @@ class ArduPlane:
         """
         known = self.settings
         # FF T / s with T = s^2 w: the scaler stands once in it.
-        factor = FULL_RAD / speed_scaler(self.trim_mps, self.fixed)
+        factor = FULL_RAD / (speed_scaler(self.trim_mps, self.fixed) * self.share)
         ff = known["FF"].rounded(feed_forward * factor)
         p = chosen["P"]
         i = min(p, ff) if self.axis == "roll" else max(0.75 * p, ff)
@@ -109,7 +116,8 @@ class ArduPlane:
 
     def loop(self, gains: Mapping[str, float], airspeed_mps: float) -> ArduPlaneLoop:
         """Return the axis with gains at an airspeed."""
-        return ArduPlaneLoop(dict(gains), speed_scaler(airspeed_mps, self.fixed), self.fixed)
+        scaler = speed_scaler(airspeed_mps, self.fixed)
+        return ArduPlaneLoop(dict(gains), scaler, self.fixed, self.share)
 
 
 # What a log says of the parameters that stay, by their names in it.
@@ -139,4 +147,15 @@ def structure(axis: str, logged: Mapping[str, float], trim_mps: float) -> ArduPl
         Airspeed of the model.
     """
     names = {key: name.format(PREFIX[axis]) for key, name in LOGGED.items()}
-    return ArduPlane(axis, parameter_table.fixed("ardupilot", names, logged), trim_mps)
+    fixed = parameter_table.fixed("ardupilot", names, logged)
+    return ArduPlane(axis, fixed, trim_mps, mixer_share(axis, logged))
+
+
+def mixer_share(axis: str, logged: Mapping[str, float]) -> float:
+    """Return the share of travel that elevons, or the pitch of a V-tail, have at full output.
+
+    servos.cpp: each side is the sum of two axes times MIXING_GAIN.
+    """
+    functions = {int(v) for name, v in logged.items() if re.fullmatch(r"SERVO\d+_FUNCTION", name)}
+    mixed = functions & (ELEVONS if axis == "roll" else ELEVONS | V_TAIL)
+    return logged.get("MIXING_GAIN", MIXING_GAIN) if mixed else 1.0

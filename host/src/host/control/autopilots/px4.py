@@ -42,8 +42,9 @@ def speed_scale(airspeed_mps: float, fixed: Mapping[str, float]) -> float:
 def share_per_torque(axis: str, logged: Mapping[str, float]) -> float:
     """Return the largest share of travel that a torque of 1 makes: the allocator's pseudo-inverse.
 
-    Surfaces that share an axis alone are meant (V-tails and elevons have one more). Without
-    CA_SV_CSn_TRQ_* it is 1, as the usual -0.5 and 0.5 of two ailerons and 1 of an elevator give.
+    Axes of one pair of elevons or of a V-tail do not mix: the sides have one sign in one and two
+    in the other. Without CA_SV_CSn_TRQ_* it is 1, as the usual -0.5 and 0.5 of two ailerons and 1
+    of an elevator give.
     """
     shares = [v for name, v in logged.items() if re.fullmatch(TORQUES[axis], name) and v != 0.0]
     return max(abs(v) for v in shares) / sum(v * v for v in shares) if shares else 1.0
