@@ -49,14 +49,24 @@ class Case:
         """Identify, and return what is compared; a refusal is an answer too."""
         with tempfile.TemporaryDirectory() as place:
             folder = Path(place)
-            sources = [opened(name, folder) for name in self.sources]
-            options = {key: _resolved(value, folder) for key, value in self.options.items()}
             truth = opened(self.truth, folder) if self.truth else None
             try:
-                found = host.identify(sources if len(sources) > 1 else sources[0], **options)
+                found = self.identified(folder)
             except HostError as error:
                 return refusal(error, folder)
             return record_of(found, folder, truth if isinstance(truth, Path) else None)
+
+    def identified(self, folder: Path) -> host.Identification:
+        """Identify from inputs that are unpacked into a folder.
+
+        Raises
+        ------
+        HostError
+            Where this case is a refusal.
+        """
+        sources = [opened(name, folder) for name in self.sources]
+        options = {key: _resolved(value, folder) for key, value in self.options.items()}
+        return host.identify(sources if len(sources) > 1 else sources[0], **options)
 
 
 def _each(value: Any) -> tuple[Any, ...]:

@@ -52,5 +52,5 @@ def test_the_notebook_runs(
     capsys.readouterr()
     place: dict[str, object] = {"host": host}
     exec(compile(code.replace(".bin", ".csv"), "README.md", "exec"), place)
-    assert "longitudinal: 2 maneuvers fitted jointly" in capsys.readouterr().out
+    assert "Known from this flight: pitch" in capsys.readouterr().out
     assert isinstance(place["found"], host.Identification)

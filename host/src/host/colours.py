@@ -14,11 +14,12 @@ _RED, _YELLOW, _GREEN, _BOLD, _END = "\033[31m", "\033[33m", "\033[32m", "\033[1
 # What a line begins with -> how it is shown: notices, and the headings of a verdict.
 _BEGINNINGS = (
     (r"host: ", _YELLOW),
-    (r"  trust\b", _GREEN),
-    (r"  less than 5 % of", _GREEN),
-    (r"  use with care\b", _YELLOW),
-    (r"  doubtful\b", _YELLOW),
-    (r"  do not (?:rely|use)\b", _RED),
+    (r"Known from this flight:", _BOLD),
+    (r"  (?:good|tiny)\b", _GREEN),
+    (r"  fair\b", _YELLOW),
+    (r"(?:Finding|Note):", _YELLOW),
+    (r"(?:  n|N)ot known\b", _RED),
+    (r"(?:Fly next|Measure):", _BOLD),
     (r"(?:losses|stuck|saturated) +(?!none)\S", _RED),
     (r"(?:longitudinal|lateral|coefficients)\b[^:]*:", _BOLD),
 )

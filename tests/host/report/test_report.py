@@ -140,10 +140,11 @@ def test_a_second_method_and_what_the_aircraft_file_says_stand_beside(
 
 def test_modes_of_a_simulated_flight_name_the_damping_once() -> None:
     mode = {"name": "short period", "eigenvalue": [-10.0, 15.0], "frequency_radps": 18.0}
+    mode |= {"known": "not", "reason": "q_radps is not predicted"}
     truth = {"short period": {"truth": 18.4}, "short period, damping": {"truth": 0.57}}
     numbers = JsonNumbers({"answers": [{"modes": [mode]}], "truth": {"own": truth}})
     text = re.sub("<[^>]+>", " ", mode_table(numbers, ["own"], ["mine"]))
-    assert " ".join(text.split()).endswith("18.4 , damping 0.57")
+    assert " ".join(text.split()).endswith("not: q_radps is not predicted 18.4 , damping 0.57")
 
 
 def test_sections_of_a_hostile_log_stay_text(flight: ShownFlight) -> None:

@@ -123,7 +123,7 @@ def _reason(log: FlightLog, session: Session) -> str:
     events, _ = session.slow("event")
     ends = events[events["code"] == log.schema.number("event", "session_end")]
     if not len(ends):
-        return "no end event"
+        return "the log ends before the recorder said why"
     # Logs before these words have the same numbers.
     words = log.schema if "end_cause" in log.schema.enums else packed_schema()
     word = words.word("end_cause", int(ends["arg"][-1]))

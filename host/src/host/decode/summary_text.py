@@ -56,6 +56,9 @@ def _session(session: Mapping[str, Any]) -> Iterator[str]:
     who = ", ".join(
         filter(None, (session["board"], session["firmware"], image, session["aircraft"]))
     )
+    if not session["duration_s"]:
+        yield _row(f"session {session['number']}", "no rows: switched off before it recorded")
+        return
     yield _row(
         f"session {session['number']}",
         f"{session['duration_s']:.2f} s at {session['rate_hz']:g} Hz from t ="
@@ -68,7 +71,7 @@ def _session(session: Mapping[str, Any]) -> Iterator[str]:
             "  jitter",
             f"p50 {jitter['p50']:.0f} us, p99 {jitter['p99']:.0f} us, max {jitter['max']:.0f} us",
         )
-    yield _row("  sensors", ", ".join(session["sensors"]) or "none heard of")
+    yield _row("  sensors", ", ".join(session["sensors"]) or "no frame of a sensor in the log")
     for name, seconds in session["stuck"].items():
         yield _row("  STUCK", f"{name} did not move for {seconds:.1f} s")
     for name, share in session["saturated"].items():

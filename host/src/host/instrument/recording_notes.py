@@ -36,7 +36,7 @@ def recording_notes(instrument: SensorErrorModel) -> list[str]:
     if instrument.recording.commanded:
         lines.append(
             f"{', '.join(instrument.recording.commanded)}: the command through {whose}"
-            f" ({hertz:g} Hz, {rate:.3g} rad/s); a pot knows better"
+            f" ({hertz:g} Hz, {rate:.3g} rad/s); a pot would measure it"
         )
     if instrument.recording.clock_share is None:
         share = 100.0 * NORMAL_95 * clock_share(instrument)

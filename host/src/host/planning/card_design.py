@@ -9,6 +9,7 @@ import math
 from dataclasses import astuple, replace
 
 from host.aircraft.file import Aircraft
+from host.aircraft.input_steps import ROLL_HALF_S, ROLL_UNIT_S, half_of_doublet_s, unit_of_3211_s
 from host.aircraft.linear_aircraft import load
 from host.aircraft.linearisation import linearise, modes
 from host.aircraft.mode_names import DUTCH_ROLL, SHORT_PERIOD
@@ -20,8 +21,6 @@ from host.twin.testcard.cards import BEFORE_S, Card, Pilot, Segment
 
 # Excursions a first test flight of a trainer keeps to; amplitudes of a designed card aim at them.
 TARGET_EXCURSIONS = {"alpha_deg": 3.5, "beta_deg": 6.0, "bank_deg": 30.0}
-HAND_S = 0.2  # a thumb is no faster
-ROLL_UNIT_S = 0.3  # of a 3-2-1-1 on the aileron: long against the roll mode of models
 
 
 def _periods_s(aircraft: Aircraft, airspeed_mps: float) -> tuple[float, float]:
@@ -41,8 +40,9 @@ def mode_widths_s(aircraft: Aircraft, airspeed_mps: float) -> dict[str, float]:
     airspeed_mps : float
     """
     short, dutch = _periods_s(aircraft, airspeed_mps)
-    units = {"elevator": 0.3 * short, "aileron": ROLL_UNIT_S, "rudder": 0.3 * dutch}
-    return {axis: round(max(unit, HAND_S), 2) for axis, unit in units.items()}
+    units = {"elevator": unit_of_3211_s(short), "aileron": ROLL_UNIT_S,
+             "rudder": unit_of_3211_s(dutch)}  # fmt: skip
+    return {axis: round(unit, 2) for axis, unit in units.items()}
 
 
 def design(name: str, airspeed_mps: float = 0.0) -> Card:
@@ -72,12 +72,11 @@ def design(name: str, airspeed_mps: float = 0.0) -> Card:
     aircraft = load(name)
     speed = airspeed_mps or aircraft.scalar("trim.airspeed_mps")
     short, dutch = _periods_s(aircraft, speed)
-    hand = HAND_S
     draft = (
-        Segment("3211", axes=("elevator",), amplitudes=(2.0,), width_s=max(0.3 * short, hand)),
-        Segment("doublet", axes=("elevator",), amplitudes=(2.0,), width_s=max(0.5 * short, hand)),
-        Segment("doublet", axes=("rudder",), amplitudes=(4.0,), width_s=max(0.5 * dutch, hand)),
-        Segment("doublet", axes=("aileron",), amplitudes=(3.0,), width_s=0.6),
+        Segment("3211", axes=("elevator",), amplitudes=(2.0,), width_s=unit_of_3211_s(short)),
+        Segment("doublet", axes=("elevator",), amplitudes=(2.0,), width_s=half_of_doublet_s(short)),
+        Segment("doublet", axes=("rudder",), amplitudes=(4.0,), width_s=half_of_doublet_s(dutch)),
+        Segment("doublet", axes=("aileron",), amplitudes=(3.0,), width_s=ROLL_HALF_S),
     )
     flight = Card(name="plan", title="", aircraft=name, segments=draft)
     flight = replace(flight, flight=replace(flight.flight, airspeed_mps=speed))

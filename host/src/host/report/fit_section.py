@@ -32,13 +32,14 @@ def mode_table(numbers: JsonNumbers, label_of: list[str], title_of: list[str]) -
                 escaped("1/s" if real else "rad/s"),
                 "" if real else numbers.html(*place, "damping", digits=3),
                 "" if real else numbers.html(*place, "damping_half_width", digits=2),
+                escaped(f"{mode['known']}: {mode['reason']}" if mode["reason"] else mode["known"]),
                 _truth(numbers, label_of[at], mode["name"]),
             ])  # fmt: skip
     heads = ["model", "mode", "frequency or root", "95 % \u00b1", "unit", "damping", "95 % \u00b1",
-             "truth"]  # fmt: skip
+             "known", "truth"]  # fmt: skip
     if all(row[-1] == "" for row in rows):
         heads, rows = heads[:-1], [row[:-1] for row in rows]
-    return table(heads, rows, (0, 1, 4))
+    return table(heads, rows, (0, 1, 4, 7))
 
 
 def _truth(numbers: JsonNumbers, label: str, mode: str) -> str:

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
 _TRUST, _CARE, _SMALL, _NOT, _NEVER = MARKS
 _BESIDE = "beside"  # file of the second method's numbers in the page
-_FLY = ("fly", "learn")  # words of lines that say what to do next
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +104,8 @@ def report_page(parts: ReportParts) -> str:
           for at, label in enumerate(called)),
         _section("Methods side by side", _methods(numbers, beside)),
         _section("Modes", mode_table(numbers, called, titles) + _pictures(figures, poles)),
-        _section("What to fly again", items(_advice(found))),
+        _section("What to fly next", items(found.summary.fly_lines())),
+        _section("What to measure on the ground", items(found.summary.measure_lines())),
         _appendix(parts, {"result": text} | ({_BESIDE: others} if others else {})),
     ]  # fmt: skip
     return HtmlPage(
@@ -160,14 +160,15 @@ def _verdict_box(found: Identification, numbers: JsonNumbers) -> str:
             *(f'<span class="{kind}">{escaped(", ".join(by[mark]) or "none")}</span>'
               for mark, kind in ((_TRUST, "good"), (_CARE, "fair"), (_NOT, "poor"), (_SMALL, ""))),
         ])  # fmt: skip
-    heads = ["model", "trust (within 10 %)", "use with care", "do not rely on",
-             "small: under 5 % of its row"]  # fmt: skip
+    heads = ["model", "good (within 10 %)", "fair", "not known",
+             "tiny: under 5 % of its equation"]  # fmt: skip
     if all(row[-1].endswith(">none</span>") for row in rows):
         heads, rows = heads[:-1], [row[:-1] for row in rows]
+    short = "\n".join(map(escaped, found.summary_lines()))
     lines = "\n".join(map(escaped, found.verdict))
     return (
-        f'<div class="verdict"><h2>Verdict</h2>{table(heads, rows, range(5))}'
-        f"<details open><summary>in words</summary><pre>{lines}</pre></details></div>"
+        f'<div class="verdict"><h2>Verdict</h2><pre>{short}</pre>{table(heads, rows, range(5))}'
+        f"<details><summary>every reason</summary><pre>{lines}</pre></details></div>"
     )
 
 
@@ -218,19 +219,6 @@ def _answer(
         parts.append(items(f"prior: {line}" for line in found.prior.source if line))
     parts.append(_pictures(figures, {f"{label}_intervals": f"{title}: 95 % intervals"}))
     return _section(f"Measured against model: {escaped(title)}", "".join(parts))
-
-
-def _advice(found: Identification) -> list[str]:
-    """Return the lines of the verdict that say what to fly or measure."""
-    said: dict[str, None] = {}
-    about = ""
-    for line in found.verdict:
-        if not line.startswith(" "):
-            about = line.partition(":")[0]
-        if any(word in line.split() for word in _FLY) or "measure " in line:
-            what = line.strip().replace("to learn them", "for parameters not to be relied on", 1)
-            said[what if what.startswith(about) else f"{about}: {what}"] = None
-    return list(said) or ["nothing: the verdict asks for no other maneuver"]
 
 
 def _appendix(parts: ReportParts, documents: Mapping[str, str]) -> str:

@@ -147,7 +147,9 @@ def run(args: argparse.Namespace) -> int:
     except UsageError as error:
         raise UsageError(option_words(str(error))) from error
     announce_aircraft([args.aircraft])
-    print(found.to_json() if args.json else option_words("\n".join(map(shown, found.verdict))))
+    print(
+        found.to_json() if args.json else option_words("\n".join(map(shown, found.summary_lines())))
+    )
     size = target.stat().st_size / 1e6
     print(f"wrote {shown(str(target))} ({size:.2f} MB)", file=sys.stderr)
     if args.open:

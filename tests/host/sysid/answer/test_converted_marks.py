@@ -11,7 +11,7 @@ from host.sysid.aerodynamics.coefficient_table import Coefficient
 from host.sysid.answer import CAREFUL, MARKS, TRUSTED, answer_document, json_text
 from host.sysid.answer.converted_marks import converted_marks
 from host.sysid.answer.marks import SMALL, UNSURE
-from host.sysid.answer.short_answer import short_table
+from host.sysid.answer.summary_rows import summary_rows
 from host.sysid.linear import Answer
 from host.sysid.pipeline.estimate_table import estimate_table
 from studies.wrong_flights import fly
@@ -64,5 +64,6 @@ def test_table_json_and_screen_say_it(answer: Answer, share: float, mark: str) -
     assert table.loc[(wide.template, "Cm_q"), "verdict"] == mark
     document = json.loads(json_text(answer_document(wide, [], verdict)))
     assert document["coefficients"]["Cm_q"]["mark"] == mark
-    (row,) = [line for line in short_table([wide], None, [verdict]) if "Cm_q" in line]
-    assert row.endswith(f", {mark}") is (mark != TRUSTED)
+    (row,) = [one for one in summary_rows([wide], None, [verdict]) if one.name == "Cm_q"]
+    assert row.mark == mark
+    assert row.word == {TRUSTED: "good", CAREFUL: "fair", UNSURE: "not"}[mark]

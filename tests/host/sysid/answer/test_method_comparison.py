@@ -57,7 +57,7 @@ def test_what_did_not_converge_is_not_trusted(answers: dict[str, Answer]) -> Non
     stopped = answers["hopfield"]
     assert not stopped.result.converged
     lines = verdict_lines([stopped], [])
-    assert "  trust (within 10 %):  nothing" in lines
+    assert "  good (within 10 %):  nothing" in lines
     assert "  no convergence: estimates and intervals mean nothing, use another method" in lines
     table = method_table([stopped], 80)
     assert all(line.endswith("*") for line in table[1:-1])

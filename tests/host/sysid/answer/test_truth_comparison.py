@@ -49,7 +49,7 @@ def test_a_coefficient_next_to_nothing_is_not_judged_by_its_size() -> None:
     (drag,) = compared_coefficients(table(CD_de=(0.01, 0.02)), DOCUMENT, {"CD_de": 0.04})
     assert drag.error == pytest.approx(0.25)
     lines = truth_lines([drag])
-    assert "+25.0 % of 5 % of the row  inside" in lines[1]
+    assert "+25.0 % of what would be 5 % of its equation  inside" in lines[1]
     assert lines[-1].strip() == "1 of 1 intervals hold the truth"
 
 

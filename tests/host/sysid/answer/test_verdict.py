@@ -18,7 +18,7 @@ from host.sysid.models.templates import TEMPLATES
 from studies.aircraft import navion_structured
 from studies.data import noisy
 
-from tests.host.sysid.verdicts import verdict_lines
+from tests.host.sysid.verdicts import verdict_lines, verdict_of
 
 
 @pytest.fixture(scope="module")
@@ -45,13 +45,11 @@ def test_a_wide_interval_is_named_and_a_bound_is_not_trusted(answer: Answer) -> 
     )
     lines = verdict_lines([replace(answer, result=result)], [])
     headed = {line.split(":  ")[0].strip(): line.split(":  ")[-1] for line in lines}
-    assert names[0] in headed["trust (within 10 %)"].split(", ")
-    assert headed["use with care (10 to 30 %)"] == names[1]
-    assert headed["do not rely on (above 30 %)"] == f"{names[2]} (50 %), {names[3]} (300 %)"
+    assert names[0] in headed["good (within 10 %)"].split(", ")
+    assert headed["fair (10 to 30 %)"] == names[1]
+    assert headed["not known (interval above 30 %)"] == f"{names[2]} (50 %), {names[3]} (300 %)"
     on_bound = [line for line in lines if names[4] in line]
-    assert on_bound == [
-        f"  do not rely on {names[4]}, whatever the interval: the estimate is on its bound"
-    ]
+    assert on_bound == [f"  not known: {names[4]}: the estimate is on its bound"]
 
 
 def test_collinear_data_without_a_pair_are_no_empty_brackets(answer: Answer) -> None:
@@ -70,19 +68,20 @@ def test_what_is_not_predicted_is_not_trusted(answer: Answer) -> None:
     lost = replace(answer, result=sure, validation=(failing,), modes=modes(sure))
     assert list(unpredicted_states(lost)) == [speed]
     lines = verdict_lines([lost], [])
-    trusted = next(line for line in lines if "trust" in line).split(":  ")[1].split(", ")
-    reason = next(line for line in lines if "whatever the interval" in line)
+    trusted = next(line for line in lines if "good" in line).split(":  ")[1].split(", ")
+    reason = next(line for line in lines if "not known: " in line)
     row = {t.parameter for t in answer.model.terms if t.row == 0 and t.matrix in "AB"}
     column = {t.parameter for t in answer.model.terms if t.column == 0 and t.matrix == "A"}
     assert row | column
     assert not (row | column) & set(trusted)
     assert all(name in reason for name in row | column)
     assert set(trusted) <= set(names) - row - column
-    marked = [line for line in model_lines(lost) if "not to be relied on" in line]
+    shown = model_lines(lost, verdict_of(lost))
+    marked = [line for line in shown if ", not: " in line]
     assert [line.split(":")[0].strip() for line in marked] == ["phugoid"]
-    assert not any("nothing was left" in line for line in lines)
+    assert not any("no maneuver was left" in line for line in lines)
     alone = verdict_lines([replace(lost, validation=())], [])
-    assert any("nothing was left to be predicted" in line for line in alone)
+    assert any("no maneuver was left to predict" in line for line in alone)
 
 
 def test_a_small_entry_is_not_called_trustworthy(answer: Answer) -> None:
@@ -95,7 +94,7 @@ def test_a_small_entry_is_not_called_trustworthy(answer: Answer) -> None:
     half[1] = 0.1 * floor / 1.96
     result = replace(answer.result, estimate=estimate, covariance=np.diag(half**2))
     lines = verdict_lines([replace(answer, result=result)], [])
-    little = next(line for line in lines if "less than 5 % of their row" in line)
+    little = next(line for line in lines if "  tiny (" in line)
     assert answer.model.parameter_names[1] in little.split(":  ")[1].split(", ")
 
 
@@ -105,8 +104,8 @@ def test_a_delay_at_its_bound_is_no_failed_prediction(answer: Answer) -> None:
     bound = replace(STANDARD_DELAYS[3], outputs=(speed,))
     model = replace(answer.model, delays=(bound,))
     lost = replace(answer, model=model, delays={bound.name: (bound.limit_s, 0.0)})
-    (line,) = [x for x in verdict_lines([lost], []) if "whatever the interval" in x]
-    assert line.endswith(f"whatever the interval: the delay of {speed} is at its bound")
+    (line,) = [x for x in verdict_lines([lost], []) if "not known: " in x]
+    assert line.endswith(f": the delay of {speed} is at its bound")
 
 
 def test_a_roll_model_has_no_spiral() -> None:

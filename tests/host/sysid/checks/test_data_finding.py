@@ -178,4 +178,4 @@ def test_a_real_aircraft_goes_through_as_it_is(capsys: pytest.CaptureFixture[str
     answer = json.loads(capsys.readouterr().out)
     assert answer["answers"]
     said = " ".join(line for a in answer["answers"] for line in a["verdict"])
-    assert "trust (within 10 %):  nothing" in said
+    assert "good (within 10 %):  nothing" in said

@@ -191,14 +191,14 @@ def test_says_what_to_trust_and_why_not(
     assert table["Cn_p"]["flagged"]
     assert "tilt" in table["Cn_p"]["widened_by"]
     assert not table["Cm_q"]["flagged"]
-    assert any("do not rely on Cn_p" in line for line in document["verdict"])
+    assert any("not known: Cn_p" in line for line in document["verdict"])
     assert any("prediction of unseen maneuvers (9 of 9" in line for line in document["verdict"])
     unseen = document["unseen"]["nrmse"]
     assert set(unseen) == {"CL", "CD", "Cm", "CY", "Cl", "Cn"}
     assert all(s["fitted"] < s["unseen"] < 1.1 * s["fitted"] for s in unseen.values())
     scattered = {n: r for n, r in document["repeats"].items() if r["widened_by"] > 1.0}
     assert all(r["p_value"] < 0.01 for r in scattered.values())
-    named = [line for line in document["verdict"] if "do not agree on" in line]
+    named = [line for line in document["verdict"] if "maneuvers disagree on" in line]
     assert len(named) == len(scattered)
     text = str(found[0])
     assert text.startswith("note: no GPS checked the clock")

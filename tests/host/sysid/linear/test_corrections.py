@@ -46,7 +46,7 @@ import host
 from tests.host.sysid import recorded
 from tests.host.sysid.at_hand import identify
 from tests.host.sysid.recorded import NAME, Columns
-from tests.host.sysid.verdicts import verdict_lines
+from tests.host.sysid.verdicts import verdict_lines, verdict_of
 
 
 @pytest.fixture(scope="module")
@@ -356,9 +356,8 @@ def test_a_delay_at_its_bound_is_called_so(
     for answer in answers:
         assert "delay_vanes_s" in answer.at_bound
         assert any("delay_vanes_s is at its bound" in line for line in verdict_lines([answer], []))
-        assert any(
-            "delay_vanes_s" in line and "at its bound" in line for line in model_lines(answer)
-        )
+        shown = model_lines(answer, verdict_of(answer))
+        assert any("delay_vanes_s" in line and "at its bound" in line for line in shown)
 
 
 def test_the_verb_says_what_it_corrected_and_can_leave_it(

@@ -34,7 +34,7 @@ def test_surfaces_that_the_transmitter_mixes_are_not_told_apart(
     left_out = {n for n in ("L_da", "L_dr", "N_da", "N_dr") if answer.result.value(n) == 0.0}
     assert len(left_out) == (2 if method == "stepwise" else 0)
     assert left_out or {"L_da", "L_dr", "N_da", "N_dr"} <= refused
-    mixed = "  aileron_rad and rudder_rad move together: fly them one at a time"
+    mixed = "  aileron_rad and rudder_rad moved together: fly one at a time"
     assert any(line.startswith(mixed) for line in verdict_lines([answer], []))
     [trusted] = [line for line in verdict_lines([answer], []) if "trust (" in line]
     assert "L_p" in trusted

@@ -64,7 +64,7 @@ def flown(kind: str, seed: int = 4) -> Maneuver:
     ("kind", "method", "words"),
     [
         ("white", "output-error-white", "white, it has no memory"),
-        ("coloured", "output-error", "noise with a memory (BIC"),
+        ("coloured", "output-error", "coloured noise (BIC"),
         ("gust", "filter-error-gust", "gust (BIC"),
     ],
 )

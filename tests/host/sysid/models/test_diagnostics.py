@@ -111,7 +111,7 @@ def test_collinear_parameters_are_named_with_their_partner_and_grade() -> None:
     named = {r.name: r for r in found.flags}
     assert found.not_identifiable
     assert {"M_de", "M_tab"} <= set(found.names(NOT_IDENTIFIABLE))
-    assert "moves together with M_de" in named["M_tab"].reason
+    assert "its correlation with M_de is" in named["M_tab"].reason
     assert "Z_alpha" not in named
 
 
@@ -142,13 +142,12 @@ def test_both_grades_reach_the_words_the_table_and_the_document() -> None:
         delays={},
     )
     text = verdict_lines([answer], [])
-    table = model_lines(answer)
+    table = model_lines(answer, verdict_of(answer))
     document = answer_document(answer, text, verdict_of(answer))
     for named in found.flags:
-        warning = "do not use" if named.grade == NOT_IDENTIFIABLE else "doubtful,"
-        assert f"  {warning} {named.name}: {named.reason}" in text
-        assert any(line.split()[0] == named.name and named.grade in line for line in table)
-    trusted = next(line for line in text if "trust (" in line)
+        assert f"  not known: {named.name} ({named.reason})" in text
+        assert any(line.split()[0] == named.name and " not" in line for line in table)
+    trusted = next(line for line in text if "good (" in line)
     assert not set(cannot + doubtful) & {w.strip(",") for w in trusted.split()}
     assert {r["name"]: r["grade"] for r in document["refused"]} == {
         **dict.fromkeys(cannot, NOT_IDENTIFIABLE),

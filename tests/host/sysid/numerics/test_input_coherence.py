@@ -98,14 +98,14 @@ def test_a_sensor_slower_than_the_rows_keeps_its_noise() -> None:
 def test_output_error_widens_by_what_its_noise_had_explained() -> None:
     maneuver = record(2, "AR(1) 0.9", lag_s=0.5, snr=40.0)
     result = fit("output-error", navion_structured(), [maneuver])
-    assert any("the inputs drive what the fit leaves" in w for w in result.warnings)
+    assert any("follows the inputs" in w for w in result.warnings)
     k, truth = result.index("M_de"), navion_structured().start[-1]
     noise = fit("output-error", navion_structured(), [maneuver], model_error=False)
     factor = result.standard_error[k] / noise.standard_error[k]
     assert factor > 1.5
     assert abs(result.estimate[k] - truth) > result.half_width()[k] / factor  # it was too narrow
     right = fit("output-error", navion_structured(), [record(3, "AR(1) 0.9", snr=40.0)])
-    assert not any("the inputs drive what the fit leaves" in w for w in right.warnings)
+    assert not any("follows the inputs" in w for w in right.warnings)
 
 
 @pytest.mark.parametrize(("kind", "named"), [("columns", ()), ("inputs", ("p_radps",))])

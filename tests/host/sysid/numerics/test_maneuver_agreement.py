@@ -50,7 +50,7 @@ def test_an_aircraft_that_changes_is_named_and_its_interval_widened(method: str)
         found.factor[PLACE] * result.standard_error[PLACE]
     )
     assert wide.half_width()[PLACE] == pytest.approx(2.776 * wide.standard_error[PLACE], rel=0.01)
-    assert any("do not agree on M_alpha" in line for line in wide.warnings)
+    assert any("maneuvers disagree on M_alpha" in line for line in wide.warnings)
     other = MODEL.parameter_names.index("Z_u")
     assert found.factor[other] == 1.0
 

@@ -109,7 +109,7 @@ def test_modes_are_a_table_too(one: Identification) -> None:
 
 
 def test_the_verdict_is_lines_and_the_answer_reads_itself(one: Identification) -> None:
-    assert any(line.startswith("longitudinal: 2 maneuvers fitted jointly") for line in one.verdict)
+    assert any(line.startswith("longitudinal: 2 maneuvers fitted, 1 kept") for line in one.verdict)
     assert all("\n" not in line for line in one.verdict)
     assert repr(one).startswith("<Identification of ")
     assert "M_alpha" in str(one)
@@ -220,7 +220,9 @@ def test_the_verb_takes_several_flights(
     }  # fmt: skip
     assert both.coefficients is not None
     assert both.coefficients.maneuvers[0].endswith("of flight 1")
-    drawn = draw_coefficients(both.coefficients, [f.recorded for f in both.flights])
+    drawn = draw_coefficients(
+        both.coefficients, both.verdicts[-1], [f.recorded for f in both.flights]
+    )
     axes = drawn["coefficients_input"].axes[0]
     moved = [float(np.max(np.asarray(line.get_ydata()))) for line in axes.get_lines()]
     count = len(both.coefficients.used)

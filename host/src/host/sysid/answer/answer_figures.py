@@ -23,6 +23,8 @@ from host.sysid.answer.figure_kinds import (
 from host.sysid.answer.frequency_pictures import frequency_pictures
 from host.sysid.answer.marks import UNSURE, USELESS, Verdict
 from host.sysid.answer.mat_file import labels
+from host.sysid.answer.mode_lines import coefficient_modes, linear_modes
+from host.sysid.answer.parameter_words import NOT
 from host.sysid.answer.truth_comparison import true_coefficients, true_poles
 from host.sysid.models.diagnostics import reference_values
 from host.sysid.models.parameter_units import parameter_unit
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from host.arrays import Array
+    from host.sysid.answer.mode_lines import JudgedMode
     from host.sysid.checks.data_finding import Finding
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
     from host.sysid.linear.linear_answer import Answer
@@ -74,7 +77,7 @@ def draw_all(
     found: dict[str, Figure] = {}
     for answer, label, verdict in zip(answers, labels(answers), verdicts, strict=False):
         found |= draw(answer, label, verdict, truth, findings)
-    return found | (draw_coefficients(direct, flights, truth) if direct else {})
+    return found | (draw_coefficients(direct, verdicts[-1], flights, truth) if direct else {})
 
 
 def save_all(pictures: Mapping[str, Figure], folder: Path) -> list[Path]:
@@ -131,7 +134,7 @@ def draw(
     return {
         f"{name}_fit": histories(traces, title),
         f"{name}_poles": pole_map(
-            _clouds(answer.modes, true_poles(answer.modes, truth, (answer.template,))),
+            _clouds(linear_modes(answer), true_poles(answer.modes, truth, (answer.template,))),
             f"{about}: poles, scatter from the covariance",
         ),
         f"{name}_intervals": interval_bars(bars, about),
@@ -141,6 +144,7 @@ def draw(
 
 def draw_coefficients(
     answer: CoefficientAnswer,
+    verdict: Verdict,
     flights: Sequence[Mapping[str, Array]],
     truth: dict[str, Any] | None = None,
 ) -> dict[str, Figure]:
@@ -149,6 +153,7 @@ def draw_coefficients(
     Parameters
     ----------
     answer : CoefficientAnswer
+    verdict : Verdict
     flights : sequence of mapping
         Columns of what it was made of; surfaces give the spectrum of the inputs.
     truth : dict, optional
@@ -166,6 +171,7 @@ def draw_coefficients(
     true: dict[str, float] = {}
     for table in answer.tables if truth is not None else ():
         true |= true_coefficients(truth or {}, table.template)
+    poles = true_poles(answer.modes, truth, ("longitudinal", "lateral"))
     bars = [
         Bar(d.name, d.value, d.half_width, d.reference, d.flagged, true.get(d.name))
         for d in answer.fit.derivatives
@@ -179,7 +185,7 @@ def draw_coefficients(
     return {
         "coefficients_fit": histories(signals, title),
         "coefficients_poles": pole_map(
-            _clouds(answer.modes, true_poles(answer.modes, truth, ("longitudinal", "lateral"))),
+            _clouds(coefficient_modes(answer, verdict), poles),
             "coefficients: poles, scatter from the covariance",
         ),
         "coefficients_intervals": interval_bars(bars, "coefficients"),
@@ -214,17 +220,17 @@ def _linear_traces(answer: Answer) -> tuple[dict[str, list[Trace]], str]:
     return signals, f"{'one step' if one_step else 'free simulation'}, fitted data{shade}"
 
 
-def _clouds(modes: Sequence[Mode], truth: Mapping[str, complex]) -> list[Cloud]:
+def _clouds(modes: Sequence[JudgedMode], truth: Mapping[str, complex]) -> list[Cloud]:
     """Draw poles from the covariance of each mode's real and imaginary part."""
     rng = np.random.default_rng(1)
     clouds = []
-    for mode in modes:
+    for judged in modes:
+        mode = judged.mode
+        name = f"{mode.name}: do not rely on" if judged.word == NOT else mode.name
         value, vector = np.linalg.eigh(mode.covariance)
         points = (vector * np.sqrt(np.maximum(value, 0.0))) @ rng.standard_normal((2, SCATTER))
         pole = mode.eigenvalue
         clouds.append(
-            Cloud(
-                mode.name, pole, pole.real + points[0], pole.imag + points[1], truth.get(mode.name)
-            )
+            Cloud(name, pole, pole.real + points[0], pole.imag + points[1], truth.get(mode.name))
         )
     return clouds

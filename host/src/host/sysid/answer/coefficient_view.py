@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from host.sysid.answer.advised_inputs import advised_input
 from host.sysid.answer.doubt import Doubt, doubt
-from host.sysid.answer.marks import Judged, mark_of, percent, share_text
+from host.sysid.answer.marks import Judged, percent, share_text
 from host.sysid.answer.trust_rules import (
     Rule,
     fit_fails,
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 
 WORSE = 1.25  # NRMSE of unseen over fitted maneuvers: more is a model that does not carry over
+EXCITED = "the inputs excite it too little"
 FAILS = 1.0  # NRMSE below 4.5 Hz, gusts in it: the mean would do better
 FORCES = ("CL", "CD", "CX", "CZ")
 # Channel to the equations whose response it makes, and to the labels it multiplies; "" is all.
@@ -66,8 +66,8 @@ class CoefficientView:
         along = sum(w.longitudinal for w in answer.windows)
         own = "" if answer.model == standard_model() else f" by the terms of '{answer.model.name}'"
         return (
-            f"coefficients{own}: {along} maneuvers of the elevator, {len(answer.windows) - along}"
-            " of aileron and rudder fitted jointly, errors of the instrument beside them"
+            f"coefficients{own}: {along} maneuvers of the elevator and"
+            f" {len(answer.windows) - along} of aileron and rudder fitted together"
         )
 
     @property
@@ -138,7 +138,7 @@ class CoefficientView:
     def width_lines(self, judged: Sequence[Judged]) -> list[str]:
         """Return what was assumed, and the coefficients with too wide intervals and why."""
         remarks = [f"  {remark}" for remark in self.answer.remarks]
-        return [*remarks, *_flag_lines(self.answer, judged)]
+        return [*remarks, *_flag_lines(self.answer)]
 
     def further_lines(self, findings: Sequence[Finding]) -> list[str]:
         """Return the lines on maneuvers that do not agree, and on prediction."""
@@ -176,21 +176,15 @@ def _not_carried_over(answer: CoefficientAnswer) -> dict[str, str]:
     }
 
 
-def _flag_lines(answer: CoefficientAnswer, judged: Sequence[Judged]) -> list[str]:
-    """Return the coefficients with too wide intervals, their causes and the remedies."""
-    lines, advice = [], set()
-    for d, one in zip(answer.fit.derivatives, judged, strict=True):
+def _flag_lines(answer: CoefficientAnswer) -> list[str]:
+    """Return the coefficients with too wide intervals, and their causes."""
+    lines = []
+    for d in answer.fit.derivatives:
         if not d.flagged:
             continue
         cause, part = answer.causes.get(d.name, ("", 0.0))
-        why = f"{100.0 * part:.0f} % of the variance is {cause}" if cause else "excited too little"
-        lines.append(
-            f"  {mark_of(one, FLAG_SHARE)} {d.name}: +- {share_text(d.share, FLAG_SHARE)}, {why}"
-        )
-        fly = advised_input(d.name) or "a larger input"
-        advice.add(f"measure {cause} better" if cause else f"fly {fly}")
-    if advice:
-        lines.append(f"  to learn them, {'; '.join(sorted(advice))}")
+        why = f"{100.0 * part:.0f} % of its variance comes from {cause}" if cause else EXCITED
+        lines.append(f"  not known: {d.name} (+- {share_text(d.share, FLAG_SHARE)}; {why})")
     return lines
 
 
@@ -198,9 +192,8 @@ def _agreement_lines(answer: CoefficientAnswer) -> list[str]:
     """Return on which coefficients the maneuvers do not agree."""
     found = answer.fit.maneuver_agreement
     return [
-        f"  maneuvers do not agree on {name}: they scatter {found.factor[k]:.1f} times what noise"
-        f" allows (chi-square {found.chi_square[k]:.1f} on {found.maneuvers[k] - 1.0:.1f}),"
-        " interval widened to it"
+        f"  maneuvers disagree on {name} by {found.factor[k]:.1f} times what noise allows; its"
+        " interval is widened by that"
         for k, name in enumerate(found.names)
         if found.factor[k] > 1.0
     ]
@@ -211,14 +204,13 @@ def _prediction_line(answer: CoefficientAnswer) -> str:
     found, count = answer.fit.prediction, len(answer.windows)
     if found is None:
         return (
-            "  no maneuver could be left out to be predicted: each alone tells a term; fly every"
-            " input at least twice"
+            "  no maneuver can be predicted by the others, for each alone informs a term: fly every"
+            " input twice"
         )
     poor = [f"{name} ({words})" for name, words in _not_carried_over(answer).items()]
-    return (
-        f"  prediction of unseen maneuvers ({len(found.windows)} of {count}, each by the others): "
-        + ("fails for " + ", ".join(poor) if poor else "holds for every coefficient")
-    )
+    if poor:
+        return f"  maneuvers are not predicted by the others in {', '.join(poor)}"
+    return f"  {len(found.windows)} of {count} maneuvers are predicted by the others"
 
 
 RULES: tuple[Rule, ...] = (

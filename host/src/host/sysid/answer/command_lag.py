@@ -29,7 +29,7 @@ def unknown_lag(answer: Answer) -> str:
         own = {name: result.index(name) for name in names}
         told = [name for name, k in own.items() if abs(result.estimate[k]) > half[k]]
         if own and not told:
-            return f"{', '.join(own)} cannot be told from zero"
+            return f"{', '.join(own)} may be zero"
     return ""
 
 

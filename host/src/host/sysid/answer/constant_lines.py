@@ -27,7 +27,9 @@ def constant_lines(answer: Answer) -> list[str]:
             value = float(result.estimate[k])
             determined = half[k] < UNDETERMINED_RATIO * max(abs(value), 1e-3)
             shown, factor = people_name(constant)
-            words = f"{factor * value:.4g} +- {factor * half[k]:.2g}" if determined else "not told"
+            words = (
+                f"{factor * value:.4g} +- {factor * half[k]:.2g}" if determined else "not estimated"
+            )
             found.setdefault(constant, (shown, []))[1].append(words)
     lines = []
     if found:

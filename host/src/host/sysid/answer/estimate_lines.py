@@ -7,40 +7,71 @@ from typing import TYPE_CHECKING
 
 from host.constants import DEG_PER_RAD
 from host.sysid.answer.constant_lines import constant_lines
-from host.sysid.answer.mode_lines import linear_mode_lines, mode_lines
+from host.sysid.answer.converted_marks import converted_marks
+from host.sysid.answer.marks import share_text
+from host.sysid.answer.mode_lines import coefficient_modes, linear_modes, mode_lines
+from host.sysid.answer.parameter_words import in_words, word_of
 from host.sysid.answer.servo_lines import servo_estimate_lines
 from host.sysid.answer.settling_history import history_lines
+from host.sysid.models.diagnostics import reference_values
 from host.sysid.models.parameter_units import parameter_unit
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from host.sysid.answer.marks import Verdict
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
     from host.sysid.linear.linear_answer import Answer
 
 
-def model_lines(answer: Answer) -> list[str]:
+def model_lines(answer: Answer, verdict: Verdict) -> list[str]:
     """Return estimates, modes and fit as a table for people."""
     result = answer.result
     half = result.half_width()
     speed = f"{answer.condition.airspeed_mps:.2f} m/s" if answer.trim.known else "unknown airspeed"
     lines = [
         f"{answer.template} at {speed},"
-        f" alpha {answer.trim.alpha_rad * DEG_PER_RAD:.1f} deg; value and 95 % half-width"
+        f" alpha {answer.trim.alpha_rad * DEG_PER_RAD:.1f} deg; value, 95 % half-width, what widens"
+        " it most"
     ]
+    size = reference_values(answer.model, answer.maneuvers, result.estimate)
     for k, name in enumerate(answer.model.parameter_names):
-        unit = parameter_unit(answer.model, name)
-        lines.append(_estimate_line(answer, name, float(result.estimate[k]), float(half[k]), unit))
-    lines += [_estimate_line(answer, name, *pair, "s") for name, pair in answer.delays.items()]
+        mark = verdict.marks.get(name, "")
+        share = f"{100.0 * float(half[k]) / max(float(size[k]), 1e-300):.0f} %" if mark else ""
+        known = f"{share} {word_of(mark)}" if mark else ""
+        called = "" if answer.own_model else in_words(name)
+        lines.append(
+            _line(
+                f"{name} {called}",
+                float(result.estimate[k]),
+                float(half[k]),
+                parameter_unit(answer.model, name),
+                known,
+                answer.causes.get(name, ""),
+            )
+        )
+    lines += [
+        _line(name, *pair, "s", "at its bound" if name in answer.at_bound else "", "")
+        for name, pair in answer.delays.items()
+    ]
     lines += servo_estimate_lines(answer.servo)
     if answer.coefficients:
+        marks = converted_marks(answer, verdict.marks)
         lines.append(
             "  coefficients (mass, inertia, pressure, places, pots and delays in the half-width)"
         )
         lines += [
-            f"  {c.name:16s} {c.value:11.5g}  +- {c.half_width:9.3g}"
-            + ("" if c.differs_from_zero else "  not told from zero")
+            _line(
+                f"{c.name} {in_words(c.name)}",
+                c.value,
+                c.half_width,
+                "",
+                f"{share_text(c.half_width / max(abs(c.value), 1e-300))} {_word(marks, c.name)}",
+                c.widened_by,
+            )
             for c in answer.coefficients
         ]
-    lines += [*constant_lines(answer), *history_lines(answer), *linear_mode_lines(answer)]
+    lines += [*constant_lines(answer), *history_lines(answer), *mode_lines(linear_modes(answer))]
     for kind, fits in (
         ("free simulation, fitted data", answer.fits),
         ("free simulation, held-out data", answer.validation),
@@ -56,16 +87,17 @@ def model_lines(answer: Answer) -> list[str]:
     return lines
 
 
-def _estimate_line(answer: Answer, name: str, value: float, half: float, unit: str) -> str:
-    """Return one number with its half-width, and what speaks against it in a word."""
-    flags = answer.identifiability_flags
-    marks = [r.grade for r in flags if r.name == name and not name.startswith("imu_")]
-    marks += ["at its bound"] if name in answer.at_bound else []
-    text = f"  {name:16s} {value:11.5g}  +- {half:9.3g}  {unit:7s}"
-    return text.rstrip() if not marks else text + "".join(f"  {mark}" for mark in marks)
+def _word(marks: Mapping[str, str], name: str) -> str:
+    return word_of(marks[name]) if name in marks else ""
 
 
-def coefficient_lines(answer: CoefficientAnswer) -> list[str]:
+def _line(name: str, value: float, half: float, unit: str, known: str, cause: str) -> str:
+    """Return one number with its half-width, how well it is known, and what widens it most."""
+    text = f"  {name.strip():25s} {value:11.5g}  +- {half:9.3g}  {unit:7s}  {known:>11s}  {cause}"
+    return text.rstrip()
+
+
+def coefficient_lines(answer: CoefficientAnswer, verdict: Verdict) -> list[str]:
     """Return coefficients, modes, delays and fit as a table for people."""
     flight = answer.fit.condition
     lines = [
@@ -74,13 +106,12 @@ def coefficient_lines(answer: CoefficientAnswer) -> list[str]:
         " what widens it most"
     ]
     for d in answer.fit.derivatives:
-        small = " of 5 % of the row" if d.reference > abs(d.value) else ""
         cause = answer.causes.get(d.name, ("", 0.0))[0]
-        line = f"  {d.name:9s} {d.value:10.4f}  +- {d.half_width:8.4f}  {100.0 * d.share:6.1f} %"
-        line += f"{small}  {cause}" + ("  flagged" if d.flagged else "")
-        lines.append(line.rstrip())
+        known = f"{share_text(d.share, verdict.fair)} {word_of(verdict.marks[d.name])}"
+        named = f"{d.name} {in_words(d.name)}"
+        lines.append(_line(named, d.value, d.half_width, "", known, cause))
     lines.append("  CD_0 is the drag at zero lift, surfaces as flown")
-    lines += mode_lines(answer.modes)
+    lines += mode_lines(coefficient_modes(answer, verdict))
     delays = ", ".join(
         f"{name.split('_')[1]} {1e3 * value:+.2f} +- {1e3 * half:.2f} ms"
         for name, (value, half) in answer.delays.items()

@@ -11,6 +11,7 @@ import numpy as np
 
 from host.sysid.answer.converted_marks import converted_marks
 from host.sysid.answer.linear_rules import unpredicted_states
+from host.sysid.answer.mode_lines import JudgedMode, coefficient_modes, linear_modes
 from host.sysid.answer.servo_lines import servo_document
 from host.sysid.answer.settling_history import settling_document
 from host.sysid.coefficients.coefficient_fit import METHOD
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
     from host.sysid.maneuvers.maneuver_grade import Grade
     from host.sysid.models.diagnostics import SignalFit
-    from host.sysid.models.modal_analysis import Mode
     from host.sysid.numerics.maneuver_agreement import ManeuverAgreement
 
 
@@ -65,18 +65,21 @@ def maneuver_document(graded: Sequence[tuple[DetectedManeuver, Grade]]) -> list[
     ]
 
 
-def mode_document(modes: Sequence[Mode]) -> list[dict[str, Any]]:
-    """Return modes with their intervals."""
+def mode_document(modes: Sequence[JudgedMode]) -> list[dict[str, Any]]:
+    """Return modes with their intervals, and whether each may be relied on."""
     return [
         {
             "name": m.name,
+            "known": judged.word,
+            "reason": judged.reason,
             "eigenvalue": [m.eigenvalue.real, m.eigenvalue.imag],
             "frequency_radps": m.frequency_radps,
             "frequency_half_width_radps": m.frequency_half_width_radps,
             "damping": m.damping,
             "damping_half_width": m.damping_half_width,
         }
-        for m in modes
+        for judged in modes
+        for m in (judged.mode,)
     ]
 
 
@@ -170,7 +173,7 @@ def answer_document(answer: Answer, lines: Sequence[str], verdict: Verdict) -> d
         "errors": [error.document() for error in answer.errors],
         "refused": _flag_document(answer),
         "coefficients": _converted_document(answer, verdict),
-        "modes": mode_document(answer.modes),
+        "modes": mode_document(linear_modes(answer)),
         "settling": settling_document(answer),
         "fit": {
             "fitted": _fit_document(answer.fits),
@@ -279,7 +282,7 @@ def coefficient_document(answer: CoefficientAnswer, verdict: Verdict) -> dict[st
             }
             for name, x in answer.systems.items()
         },
-        "modes": mode_document(answer.modes),
+        "modes": mode_document(coefficient_modes(answer, verdict)),
         "delays_s": {n: {"value": v, "half_width": h} for n, (v, h) in answer.delays.items()},
         "instrument_errors": {
             n: {"value": v, "standard_deviation": d} for n, (v, d) in answer.fit.errors.items()

@@ -45,7 +45,7 @@ def driven_by_inputs(answer: Answer, evidence: Evidence) -> list[Doubt]:
     ]
     likely = answer.coherence.likely_error
     like = f", most like {likely}" if likely else ""
-    reason = f"the inputs drive what the fit leaves of {', '.join(names)}{like}"
+    reason = f"the residual of {', '.join(names)} follows the inputs{like}"
     return _about(answer, names, reason)
 
 
@@ -82,21 +82,23 @@ def methods_disagree(answer: Answer, evidence: Evidence) -> list[Doubt]:
 
 def one_input_for_two(answer: Answer, evidence: Evidence) -> list[Doubt]:
     """Doubt inputs that moved as one, of which a regression left one out."""
-    return _named(answer, derivatives_of_both(answer), "of both inputs, one was left out")
+    return _named(answer, derivatives_of_both(answer), "both inputs moved alike; one was left out")
 
 
 def motion_left_out(answer: Answer, evidence: Evidence) -> list[Doubt]:
     """Doubt a reduced template where short records hide what other states do."""
     if not answer.left_out:
         return []
-    reason = f"what {' and '.join(answer.left_out)} does beside {answer.template} is in no interval"
+    reason = (
+        f"{answer.template} leaves out {' and '.join(answer.left_out)}, and no interval counts it"
+    )
     return _about(answer, answer.model.states, reason)
 
 
 def lag_unknown(answer: Answer, evidence: Evidence) -> list[Doubt]:
     """Doubt what commands do where nothing determines their lag."""
     why = unknown_lag(answer)
-    reason = f"the lag behind the commands is not known ({why}): they cannot be told apart"
+    reason = f"the lag behind the commands is not known ({why})"
     return _named(answer, lag_lookalikes(answer), reason) if why else []
 
 
@@ -174,7 +176,7 @@ def missed_beyond(answer: Answer, fit: SignalFit) -> str:
     found = answer.predictions.get(fit.name)
     if found is None or found.holds:
         return f" (NRMSE {percent(fit.nrmse)})"
-    return f" (NRMSE {percent(found.nrmse)}, noise and intervals allow {percent(found.largest)})"
+    return f" (NRMSE {percent(found.nrmse)}, limit {percent(found.largest)})"
 
 
 def _reached(value: float, bound: float) -> bool:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from host.sysid.answer.advised_inputs import advised_input
 from host.sysid.answer.correlated_inputs import correlated_inputs
 from host.sysid.answer.feedback_pairs import alike_derivatives, combined_derivatives
 from host.sysid.answer.linear_rules import (
@@ -75,9 +74,9 @@ class LinearView:
     def heading(self) -> str:
         """The model, its maneuvers and method."""
         answer, count = self.answer, len(self.answer.used)
-        fitted = "1 maneuver fitted" if count == 1 else f"{count} maneuvers fitted jointly"
+        fitted = f"{count} maneuver{'s' * (count != 1)} fitted"
         by, held_out = answer.result.method, len(answer.held_out)
-        return f"{answer.template}: {fitted} by {by}, {held_out} held out"
+        return f"{answer.template}: {fitted}, {held_out} kept to be predicted; method: {by}"
 
     @property
     def fair(self) -> float:
@@ -166,10 +165,10 @@ class LinearView:
             if mark_of(one) == UNSURE and not one.against
         ]
         if wide:
-            lines.append(f"  do not rely on (above 30 %):  {', '.join(wide)}")
+            lines.append(f"  not known (interval above 30 %):  {', '.join(wide)}")
         if little := [one.name for one in judged if mark_of(one) == SMALL]:
             lines.append(
-                f"  small (less than 5 % of their row, and known to be so):  {', '.join(little)}"
+                f"  tiny (below 5 % of the largest effect in the equation):  {', '.join(little)}"
             )
         return lines
 
@@ -186,27 +185,22 @@ class LinearView:
 
 
 def _identifiability_lines(answer: Answer) -> list[str]:
-    """Return the parameters that cannot be identified, the reasons, and what to fly."""
+    """Return the parameters that cannot be identified, and the reasons."""
     flags = [r for r in answer.identifiability_flags if not r.name.startswith(PLACE)]
     lines = []
     for flag in flags:
-        warning = "do not use" if flag.grade == NOT_IDENTIFIABLE else "doubtful,"
-        lines.append(f"  {warning} {flag.name}: {flag.reason}")
-    inputs = {advised_input(flag.name) for flag in flags} - {""}
-    if inputs:
-        lines.append(f"  to learn them, fly {'; '.join(sorted(inputs))}")
+        lines.append(f"  not known: {flag.name} ({flag.reason})")
     return lines
 
 
 def _input_lines(answer: Answer) -> list[str]:
     """Return the remarks on correlated inputs, and on inputs that did not move."""
     lines = [
-        f"  {one} and {other} move together: fly them one at a time, without a mixer, or leave"
-        " one out of a model of your own"
+        f"  {one} and {other} moved together: fly one at a time, without a mixer"
         for one, other in correlated_inputs(answer)
     ]
     lines += [
-        f"  {name} never moved: its derivatives are the bias under another name"
+        f"  {name} never moved, so its derivatives are not separable from the bias"
         for name in answer.constant_inputs
     ]
     if answer.collinearity.severe:
@@ -218,7 +212,7 @@ def _input_lines(answer: Answer) -> list[str]:
 def _data_lines(answer: Answer) -> list[str]:
     """Return the lines on bounds, warnings, and prediction of held-out data."""
     lines = [
-        f"  {name} is at its bound: no delay of that sensor, but what the model lacks there"
+        f"  {name} is at its bound: the model, not a delay, is wrong there"
         for name in answer.at_bound
     ]
     lines += [
@@ -228,12 +222,13 @@ def _data_lines(answer: Answer) -> list[str]:
     poor = [f.name for f in unpredicted(answer)]
     if answer.validation:
         lines.append(
-            "  prediction of the unseen maneuver: "
-            + ("fails for " + ", ".join(poor) if poor else "holds for every output")
+            f"  the unseen maneuver is not predicted in {', '.join(poor)}"
+            if poor
+            else "  the unseen maneuver is predicted in every output"
         )
     else:
         lines.append(
-            "  nothing was left to be predicted: what the model lacks is in no interval; fly each"
+            "  no maneuver was left to predict, so no interval counts errors of the model: fly each"
             " input three times"
         )
     return lines

@@ -19,7 +19,7 @@ def servo_lines(answer: Answer) -> list[str]:
     if servo is None:
         return []
     delay, bandwidth, rate = servo.numbers
-    whose = "told by the data" if delay.data_informed else "not told, as known beforehand"
+    whose = "estimated" if delay.data_informed else "as known before the flight"
     surfaces = ", ".join(u.removesuffix("_rad") for u in servo.surfaces)
     lines = [
         f"  {surfaces} is a command: the surface comes {1e3 * delay.value:.0f}"
@@ -29,7 +29,7 @@ def servo_lines(answer: Answer) -> list[str]:
     ]
     if alike := lag_lookalikes(answer):
         lines.append(
-            f"  the servos' lag and {', '.join(alike)} cannot be told apart: measure the"
+            f"  the servos' lag and {', '.join(alike)} are not separable: measure the"
             " surface (a pot), or the servo on the ground"
         )
     return lines
@@ -39,7 +39,7 @@ def servo_estimate_lines(servo: ServoEstimate | None) -> list[str]:
     """Return the servos' numbers as lines of the table of estimates."""
     return [
         f"  {n.name:22s} {n.value:9.4g}  +- {n.half_width:9.3g}  {UNITS[n.name]:7s}"
-        + ("" if n.data_informed else "as known beforehand")
+        + ("" if n.data_informed else "as known before the flight")
         for n in (servo.numbers if servo is not None else ())
     ]
 

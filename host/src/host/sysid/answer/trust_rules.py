@@ -45,7 +45,7 @@ def input_feedback(view: EstimateView, evidence: Evidence) -> list[Doubt]:
         for one in doubt(
             view.alike(law),
             view.names,
-            f"{law.surface} follows {' and '.join(law.signals)}: they cannot be told apart",
+            f"{law.surface} follows {' and '.join(law.signals)}: not separable",
         )
     ]
 

@@ -340,7 +340,7 @@ def truth_document(
 
 def _line(c: TruthComparison) -> str:
     share = f"{100.0 * c.error:+7.1f} %" if isfinite(c.error) else "        -"
-    small = " of 5 % of the row" if c.small else ""
+    small = " of what would be 5 % of its equation" if c.small else ""
     return (
         f"  {c.name:21s} {c.value:9.{_decimals(c)}f} +- {c.half_width:7.{_decimals(c)}f}"
         f"  truth {c.truth:9.{_decimals(c)}f}"

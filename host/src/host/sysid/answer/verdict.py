@@ -122,20 +122,16 @@ def _marks(view: EstimateView, doubts: Sequence[Doubt]) -> dict[str, str]:
 def _mark_lines(view: EstimateView, marks: dict[str, str]) -> list[str]:
     """Return what is within a tenth, and what within `fair`, of its size."""
     trusted = ", ".join(names_marked(marks, TRUSTED))
-    lines = [f"  trust (within 10 %):  {trusted or 'nothing'}"]
+    lines = [f"  good (within 10 %):  {trusted or 'nothing'}"]
     if careful := names_marked(marks, CAREFUL):
-        lines.append(f"  use with care (10 to {100.0 * view.fair:.0f} %):  {', '.join(careful)}")
+        lines.append(f"  fair (10 to {100.0 * view.fair:.0f} %):  {', '.join(careful)}")
     return lines
 
 
 def _doubt_lines(view: EstimateView, doubts: Sequence[Doubt]) -> list[str]:
     """Return a line for each doubt."""
     pairs = [(", ".join(n for n in one.names if n not in view.explained), one) for one in doubts]
-    return [
-        f"  do not rely on {names}, whatever the interval: {one.reason}"
-        for names, one in pairs
-        if names
-    ]
+    return [f"  not known: {names}: {one.reason}" for names, one in pairs if names]
 
 
 def removed_error_lines(answers: Sequence[Answer]) -> list[str]:

@@ -90,7 +90,7 @@ def _finding(
     said = f"{surface} {law_words(law)}{jumps}"
     causes = CAUSES.get(surface, CAUSES[""])
     if aerodynamic is None:
-        done = "no force depends on attitude or height: its derivatives are as their intervals say"
+        done = "derivatives keep their marks: no force depends on attitude or height"
         return Finding("feedback", (), said, causes, done)
     letter, own = MOMENT[surface], LABEL[surface]
     alike = [f"{letter}_{LABEL[n]}" for n in (surface, *aerodynamic.signals)]
@@ -103,9 +103,9 @@ def _finding(
     return Finding(
         "feedback",
         (),
-        f"{said}: {', '.join(alike[:-1])} and {alike[-1]} cannot be told apart",
+        f"{said}: {', '.join(alike[:-1])} and {alike[-1]} are not separable",
         causes,
-        f"only {determined} is told of them; all others are judged as ever",
+        f"only {determined} is known of them; other derivatives keep their marks",
         feedback=Feedback(surface, aerodynamic.signals, aerodynamic.gains, filtered),
     )
 

@@ -17,10 +17,10 @@ def no_instrument_errors_finding(columns: Collection[str]) -> Finding:
     return Finding(
         "instrument-errors",
         tuple(name for name in names if name in columns),
-        "without vanes the flight path is not reconstructed, and what sensors and servos may be"
-        " wrong by is in no interval",
+        "without vanes the flight path is not reconstructed, so no interval counts errors of"
+        " sensors and servos",
         ("a log without GPS velocity or airspeed", "too short a flight"),
-        done="intervals count noise, gusts and the model's lack only",
+        done="intervals count noise, gusts and errors of the model only",
     )
 
 
@@ -36,7 +36,7 @@ def no_vanes_finding(columns: Collection[str], *, reconstructed: bool = False) -
             () if reconstructed else missing,
             f"no vane measured {' and '.join(WORDS[y] for y in missing)}",
             ("an aircraft without vanes", "a column under another name"),
-            done="told by rates and accelerations where that can be, else refused"
+            done="estimated from rates and accelerations where they tell it"
             + ("; errors of IMU, places and servos are in the intervals" if reconstructed else ""),
         )
     ]

@@ -6,6 +6,7 @@ drive the residual (`numerics.input_coherence`), its power above noise counts in
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,20 +102,27 @@ def _lines(
     result: FitResult, found: InputCoherence, factor: Array, excess: NoiseExcess | None
 ) -> list[str]:
     """Return the warning: outputs that fail the test, and the inflation of the intervals."""
-    widened = ", ".join(
-        f"{p.name} {times:.1f}"
+    widened = {
+        p.name: float(times)
         for p, times in zip(result.model.parameters, factor, strict=False)
         if times >= REPORTED_FACTOR and not p.name.startswith("imu_")
-    )
+    }
     like = f", most like {found.likely_error}" if found.likely_error else ""
     reasons = []
     if found.coherent:
-        reasons.append(f"the inputs drive what the fit leaves of {', '.join(found.coherent)}{like}")
+        reasons.append(f"the residual of {', '.join(found.coherent)} follows the inputs{like}")
     if excess:
-        larger = ", ".join(f"{name} {np.sqrt(power):.1f}" for name, power in excess.power.items())
-        reasons.append(
-            f"free simulation misses by more than the fit's own gusts and noise allow (rms {larger}"
-            " times)"
+        larger = ", ".join(
+            f"{name} by {np.sqrt(power):.1f} times" for name, power in excess.power.items()
         )
-    times = f"intervals widened {widened} times" if widened else "intervals hold it already"
-    return [f"{'; '.join(reasons)}: {times}"] if reasons else []
+        reasons.append(f"free simulation misses {larger} what gusts and noise allow")
+    return [f"{'; '.join(reasons)}; {_widening(widened)}"] if reasons else []
+
+
+def _widening(factors: Mapping[str, float]) -> str:
+    """Return how much intervals were widened, and which one most."""
+    if not factors:
+        return "no interval needs to be wider for it"
+    most = max(factors, key=lambda name: factors[name])
+    count = f"{len(factors)} intervals are" if len(factors) > 1 else "1 interval is"
+    return f"{count} wider for it, that of {most} most ({factors[most]:.1f} times)"

@@ -91,9 +91,8 @@ def columns_of(log: FlightLog, wanted: Collection[str]) -> tuple[dict[str, Array
     poor_columns = [c for c in calibration_note(log)["default_columns"] if c in USED]
     if poor_columns:
         notes.append(
-            "default calibration, not this instrument's own, under: "
-            + ", ".join(poor_columns)
-            + "; its deviations are those of sensors out of the box, and so are the intervals"
+            f"{len(poor_columns)} columns have the default calibration (host calibrate); intervals"
+            f" are those of sensors out of the box: {', '.join(poor_columns)}"
         )
     poor = [f"{name} {how}" for name, how in log.inputs.items() if how != "measured"]
     if poor:

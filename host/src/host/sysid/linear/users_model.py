@@ -30,7 +30,7 @@ from host.sysid.numerics.model_problems import needs_compiler
 
 GUST, FILTER = "filter-error-gust", "filter-error"
 MEMORY, WHITE = "output-error", "output-error-white"
-NOISE_CHOSEN = "noise chosen by the data"  # begins what is said of the choice
+NOISE_CHOSEN = "noise model"  # begins what is said of the choice
 AT_LIMIT = 1e-9
 # Samples times unknowns times signals of another delay. By filter error 420 000, six degrees of
 # freedom, take forty seconds of processor time, 950 000, flight-path reconstruction, thirteen.
@@ -93,11 +93,11 @@ def fit_by_evidence(
     plain = fit_users_model(MEMORY if memory else WHITE, model, maneuvers, airspeed_mps, {})
     orders = np.asarray(plain.result.details["noise_orders"])
     coloured = bool(np.any(orders))
-    own = "noise with a memory" if coloured else "white noise"
+    own = "coloured noise" if coloured else "white noise"
     seen = not any(m.held for m in maneuvers)  # a memory, between values of a slow sensor
     if memory and seen and not coloured:
         named = replace(plain.result, method="output error (white)")
-        line = f"{NOISE_CHOSEN}: white, it has no memory"
+        line = f"{NOISE_CHOSEN}: white, for residuals are not coloured"
         return _found(WHITE, named, plain.maneuvers, remarks=(line,))
     why = no_filter(model, maneuvers)
     late = sum(bool({*d.outputs} & {*model.outputs}) for d in model.delays)  # inputs cost nothing
@@ -115,8 +115,8 @@ def fit_by_evidence(
     except IdentificationError as error:
         return replace(plain, remarks=(f"{NOISE_CHOSEN}: {own}; gust: {error}",))
     ahead = bayes_criterion(plain.result, maneuvers) - bayes_criterion(moving.result, maneuvers)
-    chosen, name, other = (moving, "gust", own) if ahead > 0.0 else (plain, own, "gust")
-    line = f"{NOISE_CHOSEN}: {name} (BIC {abs(ahead):.0f} below that of {other})"
+    chosen, name, other = (moving, "gusts", own) if ahead > 0.0 else (plain, own, "gusts")
+    line = f"{NOISE_CHOSEN}: {name} (BIC is {abs(ahead):.0f} lower than with {other})"
     return replace(chosen, remarks=(line, *chosen.remarks))
 
 

@@ -22,6 +22,7 @@ LEAST_CONTRIBUTION = 0.05
 RELATIVE_BOUND_LIMIT = 1.0  # standard error over the reference value: 100 %
 EVEN_ODDS = 0.5  # probability of a bound above the limit: more likely than not
 WEAK_PROBABILITY = 0.05  # the same: what a 95 % statement leaves
+STANDARD_ERROR = "its standard error is"  # begins the reason of a flag
 GRADES = NOT_IDENTIFIABLE, WEAKLY_IDENTIFIABLE = ("cannot be told", "doubtful")
 SHRINKAGE_PRIOR_WIDTH = 3.0
 DRAWS, DRAW_SEED = 2000, 1
@@ -344,16 +345,13 @@ def _identifiability_flag(
     correlation = np.abs(result.correlation[k, :count])
     correlation[k] = 0.0
     partner = int(np.argmax(correlation))
-    reason = f"its bound is {100.0 * relative:.0f} % of its value"
+    reason = f"{STANDARD_ERROR} {100.0 * relative:.0f} % of its value"
     if (relative > RELATIVE_BOUND_LIMIT) != (probability > EVEN_ODDS):
-        reason += f", above 100 % with a probability of {100.0 * probability:.0f} %"
+        reason += f", and above 100 % with a probability of {probability:.2f}"
     if correlation[partner] > CORRELATION_LIMIT:
-        reason += (
-            f"; it moves together with {result.names[partner]}"
-            f" (correlation {correlation[partner]:.3f})"
-        )
+        reason += f"; its correlation with {result.names[partner]} is {correlation[partner]:.3f}"
     else:
-        reason += "; the maneuver excites it too little for this noise"
+        reason += "; the input excites it too little for this noise"
     grade = NOT_IDENTIFIABLE if probability > EVEN_ODDS else WEAKLY_IDENTIFIABLE
     return IdentifiabilityFlag(result.names[k], relative, probability, grade, reason)
 

@@ -151,9 +151,8 @@ def disagreement(found: ManeuverAgreement | None) -> ModelError | None:
         return None
     inflated = found.factor > 1.0
     warnings = (
-        f"maneuvers do not agree on {found.names[k]}: they scatter {found.factor[k]:.1f} times its"
-        f" interval (chi-square {found.chi_square[k]:.1f} on {found.maneuvers[k] - 1.0:.1f}),"
-        " widened to it"
+        f"maneuvers disagree on {found.names[k]} by {found.factor[k]:.1f} times its interval, which"
+        " is widened by that"
         for k in np.flatnonzero(inflated)
     )
     freedom = np.where(inflated, found.maneuvers - 1.0, np.inf)

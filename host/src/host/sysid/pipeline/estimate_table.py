@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from host.sysid.answer.converted_marks import converted_marks
 from host.sysid.answer.mat_file import labels
+from host.sysid.answer.mode_lines import coefficient_modes, linear_modes
+from host.sysid.answer.parameter_words import in_words
 from host.sysid.models.diagnostics import reference_values
 from host.sysid.models.parameter_units import parameter_unit
 
@@ -14,14 +16,16 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from host.sysid.answer.marks import Verdict
+    from host.sysid.answer.mode_lines import JudgedMode
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
     from host.sysid.linear.linear_answer import Answer
-    from host.sysid.models.modal_analysis import Mode
 
-COLUMNS = ("value", "half_width", "unit", "relative_half_width", "verdict", "widened_by")
+COLUMNS = (
+    "value", "half_width", "unit", "relative_half_width", "verdict", "widened_by", "called",
+)  # fmt: skip
 MODE_COLUMNS = (
     "real_1ps", "imaginary_radps", "frequency_radps", "frequency_half_width_radps",
-    "damping", "damping_half_width",
+    "damping", "damping_half_width", "known",
 )  # fmt: skip
 PLAIN = "1"  # unit of a number
 NO_CAUSE = ("", 0.0)
@@ -48,7 +52,7 @@ def estimate_table(
         over the value, or over what would contribute 5 % of the largest of its equation; `unit` is
         SI and radian, ``1`` of a pure number; `verdict` is one of
         `host.sysid.answer.marks.MARKS`, empty where nothing is judged;
-        `widened_by` is what widens the interval most.
+        `widened_by` is what widens the interval most; `called` is the name in words.
     """
     rows: dict[tuple[str, str], tuple[Any, ...]] = {}
     for answer, label, verdict in zip(linear, labels(linear), verdicts, strict=False):
@@ -56,16 +60,23 @@ def estimate_table(
     if direct:
         own = _direct_rows(direct, verdicts[-1].marks)
         rows |= {(direct.template, name): row for name, row in own}
-    return _frame(rows, ("model", "name"), COLUMNS)
+    named = {place: (*row, in_words(place[1])) for place, row in rows.items()}
+    return _frame(named, ("model", "name"), COLUMNS)
 
 
-def mode_table(linear: Sequence[Answer], direct: CoefficientAnswer | None) -> pd.DataFrame:
-    """Return every mode by model and name, with 95 % half-widths; a real mode has damping +-1."""
+def mode_table(
+    linear: Sequence[Answer], direct: CoefficientAnswer | None, verdicts: Sequence[Verdict]
+) -> pd.DataFrame:
+    """Return every mode by model and name, with 95 % half-widths; a real mode has damping +-1.
+
+    `known` is ``good``, ``fair`` or ``not``.
+    """
     rows: dict[tuple[str, str], tuple[Any, ...]] = {}
     for answer, label in zip(linear, labels(linear), strict=True):
-        rows |= {(label, m.name): _mode_row(m) for m in answer.modes}
+        rows |= {(label, m.mode.name): _mode_row(m) for m in linear_modes(answer)}
     if direct:
-        rows |= {(direct.template, m.name): _mode_row(m) for m in direct.modes}
+        own_modes = coefficient_modes(direct, verdicts[-1])
+        rows |= {(direct.template, m.mode.name): _mode_row(m) for m in own_modes}
     return _frame(rows, ("model", "mode"), MODE_COLUMNS)
 
 
@@ -105,7 +116,8 @@ def _share(value: float, half_width: float) -> float:
     return half_width / max(abs(value), 1e-300)
 
 
-def _mode_row(mode: Mode) -> tuple[float, ...]:
+def _mode_row(judged: JudgedMode) -> tuple[Any, ...]:
+    mode = judged.mode
     return (
         mode.eigenvalue.real,
         mode.eigenvalue.imag,
@@ -113,6 +125,7 @@ def _mode_row(mode: Mode) -> tuple[float, ...]:
         mode.frequency_half_width_radps,
         mode.damping,
         mode.damping_half_width,
+        judged.word,
     )
 
 

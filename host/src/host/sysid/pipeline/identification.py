@@ -11,8 +11,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from host.sysid.answer.answer_summary import AnswerSummary, sources_apart
 from host.sysid.answer.method_comparison import method_table
-from host.sysid.answer.short_answer import MOST_LINES, REST, mode_summary, short_table
+from host.sysid.answer.summary_lines import COLUMNS, advice_lines, known_line, summary_lines
 from host.sysid.answer.verdict import judge, removed_error_lines
 from host.sysid.checks.data_finding import Finding
 from host.sysid.pipeline.arguments import chosen_stretches, numbers_of, path_of
@@ -82,7 +83,7 @@ class Identification:
     @property
     def modes(self) -> pd.DataFrame:
         """Every mode by model and name, with 95 % half-widths."""
-        return mode_table(self.linear, self.coefficients)
+        return mode_table(self.linear, self.coefficients, self.verdicts)
 
     @property
     def verdict(self) -> tuple[str, ...]:
@@ -101,6 +102,15 @@ class Identification:
     def verdicts(self) -> tuple[Verdict, ...]:
         """The verdict on each of `answers`, made once for every form of output."""
         return judge(self.linear, self.coefficients, self.findings)
+
+    @cached_property
+    def summary(self) -> AnswerSummary:
+        """What is said at first: how well each motion is known, and what to do next."""
+        flown = tuple(maneuver for flight in self.flights for maneuver in flight.maneuvers)
+        return AnswerSummary(
+            self.linear, self.coefficients, self.verdicts, flown, self.findings, self.notes,
+            self.aircraft is not None, len(self.flights),
+        )  # fmt: skip
 
     @property
     def answers(self) -> tuple[Answer | CoefficientAnswer, ...]:
@@ -207,30 +217,36 @@ class Identification:
         width : int
             Characters of a line of the table of several methods.
         full : bool
-            Everything; without it the verdict, the modes and one table of 40 lines, and the
+            Everything; without it a summary of 25 lines, one more for each finding, and the
             comparison with a truth or a prior that was given.
         """
-        lines = [*self.judgement, *(removed_error_lines(self.linear) if full else ())]
+        pitots: list[str] = []
         if any(self.agreements):
             from host.sysid.answer.pitot_parameter import pitot_lines
 
-            lines += pitot_lines(self.flights, self.agreements)
-        lines += self._numbers(width) if full else ["", *self._short(width)]
+            pitots = pitot_lines(self.flights, self.agreements)
+        if full:
+            known, advice = known_line(self.summary), advice_lines(self.summary)
+            lines = [known, *self.verdict, *pitots, *advice, *self._numbers(width)]
+        else:
+            lines = [*self.summary_lines(width), *pitots]
         if self.prior is not None or self.truth is not None:
             from host.sysid.pipeline.whole_answer import compared_lines
 
             lines += compared_lines(self)
         return "\n".join(lines)
 
-    def _short(self, width: int) -> list[str]:
-        modes = mode_summary(self.linear, self.coefficients)
-        if len(self.methods) > 1:
-            table = method_table(self.linear, width)
-            if len(table) > MOST_LINES:
-                table = [*table[: MOST_LINES - 1], "  ... and more: --full"]
-        else:
-            table = short_table(self.linear, self.coefficients, self.verdicts)
-        return [*modes, "", *table, REST]
+    def summary_lines(self, width: int = COLUMNS) -> list[str]:
+        """Return the summary on one screen: 25 lines for one flight, one more for each finding.
+
+        Parameters
+        ----------
+        width : int
+            Characters of a line of the table of several methods.
+        """
+        table = method_table(self.linear, width) if len(self.methods) > 1 else None
+        sources = [flight.source for flight in self.flights]
+        return summary_lines(self.summary, sources_apart(self.notes, sources), table)
 
     def _numbers(self, width: int) -> list[str]:
         from host.sysid.pipeline.whole_answer import number_lines
@@ -273,4 +289,4 @@ class Identification:
 
         sources = ", ".join(flight.source for flight in self.flights)
         tables = {"estimates, 95 % half-widths": self.table, "modes": self.modes}
-        return answer_html(f"identified from {sources}", self.verdict, tables)
+        return answer_html(f"identified from {sources}", self.summary_lines(), tables)

@@ -30,10 +30,10 @@ def number_lines(found: Identification, width: int) -> list[str]:
     if len(found.methods) > 1:
         lines += ["", *method_table(found.linear, width)]
     else:
-        for answer in found.linear:
-            lines += ["", *model_lines(answer)]
+        for answer, verdict in zip(found.linear, found.verdicts, strict=False):
+            lines += ["", *model_lines(answer, verdict)]
     if found.coefficients:
-        lines += ["", *coefficient_lines(found.coefficients)]
+        lines += ["", *coefficient_lines(found.coefficients, found.verdicts[-1])]
     for flight, agreement in zip(found.flights, found.agreements, strict=True):
         if agreement:
             named = [flight.source] if len(found.flights) > 1 else []
@@ -65,6 +65,7 @@ def whole_document(found: Identification) -> dict[str, Any]:
     one = len(sources) == 1
     return {
         "source": sources[0] if one else sources,
+        "summary": found.summary.document(),
         "findings": [finding_document(finding) for finding in found.findings],
         "notes": list(found.notes),
         "data_compatibility": agreements[0] if one else agreements,

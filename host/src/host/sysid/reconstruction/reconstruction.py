@@ -52,10 +52,10 @@ REASONS_NO_GPS = {
     "wind_east_mps": "unobservable without GPS",
     "gps_delay_s": "no GPS",
 }
-BY_FILE = "the aircraft file tells it better"
+BY_FILE = "the aircraft file is more accurate"
 NO_AGREEMENT = "the sensors did not agree; the calibration stands"
 NOT_EXCITED = "the motion flown does not show it; the calibration stands"
-NOT_EXCITED_NO_GPS = "not told from attitude and gusts without GPS; the calibration stands"
+NOT_EXCITED_NO_GPS = "attitude and gusts do not show it without GPS; the calibration stands"
 
 
 class NoAgreementError(IdentificationError):
@@ -295,7 +295,7 @@ def compatibility_lines(found: Compatibility) -> list[str]:
         if not f.data_informed:
             reasons.setdefault(f.reason, []).append(f.name)
     for why, names in reasons.items():
-        text = f"  not told: {', '.join(names)} ({why})"
+        text = f"  not estimated: {', '.join(names)} ({why})"
         lines += textwrap.wrap(text, 100, initial_indent="  ", subsequent_indent="    ")
     return lines
 

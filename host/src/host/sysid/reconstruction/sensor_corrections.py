@@ -186,7 +186,7 @@ def correction_lines(taken: Sequence[Correction]) -> list[str]:
         for c, (name, factor) in ((c, people_name(c.name)) for c in taken)
     )
     return textwrap.wrap(
-        f"taken out of the columns before the linear fits: {parts}",
+        f"sensor errors corrected in the columns of linear fits: {parts}",
         100,
         subsequent_indent="  ",
         break_on_hyphens=False,
