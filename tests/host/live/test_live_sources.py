@@ -21,7 +21,8 @@ from host.log import read_log
 from host.log.capture_head import read_capture_head
 from host.physical.calibration import load_calibration
 
-from tests.host.live.radio import joined, sent
+from tests.host.live.radio import as_sent, joined, sent
+from tests.host.logs import flight
 from tests.host.test_original_rows import APPENDIX, SECOND
 from tests.host.test_ports_status import Wire, computer, one_line
 
@@ -269,6 +270,25 @@ def test_frames_before_the_first_hash_are_decoded_with_it() -> None:
     stream = LiveStream(load_calibration())
     rows = sum(len(stream.feed(part.data, 0.0)) for part in sent(6.0))
     assert rows == ROWS
+
+
+def heights(portion: int, data: bytes) -> list[float]:
+    stream = LiveStream(load_calibration())
+    updates = (stream.feed(data[at : at + portion], 0.0) for at in range(0, len(data), portion))
+    return [one for update in updates for one in update.rows.get("altitude_m", np.empty(0))]
+
+
+def test_a_row_has_the_pressure_before_it_in_portions_of_any_size() -> None:
+    streams = flight(6.0)
+    baro = next(one for one in streams if "static_pressure" in (one.rows.dtype.names or ()))
+    # 16 m of climb in 6 s, in steps of the sensor's own.
+    baro.rows["static_pressure"] = np.linspace(16 * 101_000, 16 * 100_800, len(baro.rows))
+    data = joined(as_sent(streams, 6.0))
+    whole = heights(len(data), data)
+    assert len(whole) == ROWS
+    assert np.nanmax(whole) - np.nanmin(whole) == pytest.approx(16.0, abs=1.5)
+    for portion in (1, 500):
+        np.testing.assert_array_equal(heights(portion, data), whole)
 
 
 @pytest.mark.parametrize("row", [APPENDIX, SECOND], ids=["original", "ours and the second"])

@@ -173,6 +173,7 @@ class LiveStream:
         slow: list[SlowFrame] = []
         idents: list[bytes] = []
         times: list[float] = []
+        static_pa: list[float] = []
         lost = 0
         by_id = {frame.id: frame for frame in schema.frames} if schema else {}
         for data in frames:
@@ -186,13 +187,15 @@ class LiveStream:
             if layout.name == "ident":
                 idents.append(data)
                 times.append(t_s)
+                # The pressure that came last before it, in however large portions both came.
+                static_pa.append(self._static_pa)
                 lost += self._missing(t_s)
             else:
                 self._air(layout.name, row[0])
                 slow.append(SlowFrame(layout.name, row[0], t_s))
         self.rows += len(idents)
         self.lost += lost
-        rows, drives = self._rows(idents, times)
+        rows, drives = self._rows(idents, times, static_pa)
         return LiveUpdate(rows, drives, lost, slow, arrived_s, messages)
 
     def _seconds(self, t_us: int) -> float:
@@ -228,7 +231,7 @@ class LiveStream:
             self._static_pa = raw * field.scale if raw != field.invalid else np.nan
 
     def _rows(
-        self, idents: list[bytes], times: list[float]
+        self, idents: list[bytes], times: list[float], static_pa: list[float]
     ) -> tuple[dict[str, Array], NDArray[np.bool_]]:
         if not idents or self._maker is None or self.schema is None:
             return {}, np.empty(0, bool)
@@ -239,6 +242,6 @@ class LiveStream:
         out["t_s"] = t_s
         out["airspeed_a_mps"] = calibrated_airspeed_mps(made["differential_a_pa"])
         out["airspeed_b_mps"] = calibrated_airspeed_mps(made["differential_b_pa"])
-        out["altitude_m"] = pressure_altitude_m(np.full(len(t_s), self._static_pa))
+        out["altitude_m"] = pressure_altitude_m(np.array(static_pa))
         drives = (data["valid"] & self.schema.bit("valid", "mega_drives")) != 0
         return {name: np.asarray(out[name], np.float64) for name in LIVE_UNITS}, np.asarray(drives)
