@@ -20,8 +20,7 @@ from host.sysid.estimators.regression import solve_least_squares
 from host.sysid.estimators.start_values import start_values
 from host.sysid.models import Maneuver
 from host.sysid.models.diagnostics import reference_values
-from host.sysid.numerics.output_error import covariance_of_free, minimise
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import OutputProblem, covariance_of_free, minimise
 from host.thesis.hopfield import network
 
 from studies.aircraft import navion, navion_free, navion_structured

@@ -17,9 +17,7 @@ from host.errors import IdentificationError
 from host.sysid.estimators.output_error_ar_noise import fit_with_ar_noise
 from host.sysid.estimators.start_values import start_values
 from host.sysid.models import Maneuver
-from host.sysid.numerics.ar_noise import ArNoise, autocovariance
-from host.sysid.numerics.output_error import covariance_of_free, minimise
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import ArNoise, OutputProblem, autocovariance, covariance_of_free, minimise
 from scipy import signal, stats
 
 from studies.aircraft import navion_structured

@@ -7,7 +7,7 @@ variance and scale of the Dryden one (MIL-F-8785C).
 import numpy as np
 from host.arrays import Array
 from host.sysid.models import Maneuver
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import OutputProblem
 from scipy import linalg
 
 from studies.aircraft import FOOT_M, SPEED_FTPS, navion, navion_structured

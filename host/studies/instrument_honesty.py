@@ -28,7 +28,7 @@ from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.instrument.instrument_errors import InstrumentErrors, instrument_errors
 from host.readers.even_grid import even_columns
 from host.sysid.pipeline import aircraft_data, at_hand, identify_columns
-from host.sysid.reconstruction.reconstruction import reconstruct
+from host.sysid.reconstruction import reconstruct
 from host.twin.testcard.cards import Card, load
 from host.twin.virtual import VirtualFlight, virtual_flight
 

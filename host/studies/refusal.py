@@ -25,8 +25,7 @@ from host.sysid.models.diagnostics import (
     bound_exceedance_probability,
     reference_values,
 )
-from host.sysid.numerics.output_error import covariance_of_free, minimise
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import OutputProblem, covariance_of_free, minimise
 from scipy import special
 
 from studies.aircraft import TABLE_31_A, TABLE_31_B, navion, navion_structured

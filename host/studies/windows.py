@@ -27,8 +27,7 @@ from host.sysid.estimators import fit
 from host.sysid.maneuvers.maneuver_detection import FLYING_SHARE, detect_maneuvers
 from host.sysid.maneuvers.maneuver_selection import SURFACES, joined_windows, select_maneuvers
 from host.sysid.models import FitResult, LinearModel, Maneuver, Parameter, Term
-from host.sysid.numerics.output_error import covariance_of_free, minimise
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import OutputProblem, covariance_of_free, minimise
 from host.sysid.pipeline import at_hand, identify_columns
 from host.twin.virtual import virtual_flight
 

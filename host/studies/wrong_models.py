@@ -20,9 +20,8 @@ from host.errors import IdentificationError
 from host.physical.recording import FOREIGN, Recording
 from host.sysid.answer import CAREFUL, TRUSTED
 from host.sysid.models import Maneuver
+from host.sysid.numerics import OutputProblem, minimise
 from host.sysid.numerics.input_coherence import input_coherence
-from host.sysid.numerics.output_error import minimise
-from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.pipeline import Identification, at_hand, identify_columns
 
 from studies.aircraft import navion_structured

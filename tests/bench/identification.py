@@ -24,9 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np
 from host.sysid.estimators.start_values import start_values
-from host.sysid.numerics import recursion
-from host.sysid.numerics.output_error import covariance_of_free, minimise
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import OutputProblem, covariance_of_free, minimise, recursion
 from studies.aircraft import navion_free
 from studies.data import noisy
 

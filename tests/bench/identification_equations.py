@@ -26,7 +26,7 @@ from host.errors import IdentificationError
 from host.files.user_text import parse_toml
 from host.sysid import Maneuver, fit
 from host.sysid.models import NonlinearModel, equations_from
-from host.sysid.numerics.model_problems import output_problem
+from host.sysid.numerics import output_problem
 from scipy import integrate, optimize
 
 MOST_BOUNDS, LEAST_RATIO = 0.01, 30.0

@@ -9,7 +9,7 @@ import aeroid
 import numpy as np
 from host.arrays import Array
 from host.sysid.estimators.start_values import start_values
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import OutputProblem
 from numpy.typing import NDArray
 from scipy import optimize, signal
 

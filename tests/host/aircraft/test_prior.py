@@ -13,7 +13,7 @@ from host.aircraft.prior.datcom import read_datcom
 from host.aircraft.prior.prior_file import read_prior
 from host.aircraft.prior.prior_table import PriorError, PriorTable, about_body_axes
 from host.errors import UsageError
-from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
+from host.sysid.aerodynamics import Coefficient, CoefficientTable
 from host.sysid.answer.prior_comparison import prior_document, prior_lines
 
 DEGREE = 180.0 / np.pi

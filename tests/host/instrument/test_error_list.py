@@ -20,8 +20,7 @@ from host.instrument.error_sources import (
 from host.physical.calibration import load_calibration
 from host.physical.recording import SURFACES, Recording
 from host.resources import resource
-from host.sysid.reconstruction.inverse_sensor_model import Record, apply_sensor_errors
-from host.sysid.reconstruction.sensor_corrections import INSTANTANEOUS_ERRORS
+from host.sysid.reconstruction import INSTANTANEOUS_ERRORS, Record, apply_sensor_errors
 from host.sysid.reconstruction.sensor_dynamics import DELAYED_COLUMNS, PLACES, POTS, SERVOS
 
 NAME = "ultrastick25e"

@@ -20,7 +20,7 @@ from host.physical.recording import Recording
 from host.resources import resource
 from host.sysid.flight import FlightColumns
 from host.sysid.pipeline import aircraft_data
-from host.sysid.reconstruction.path_preparation import prior
+from host.sysid.reconstruction import prior
 from host.twin.flight.draws import DRAWN_ERRORS, draw
 from host.twin.outcome.virtual_calibration import calibration
 

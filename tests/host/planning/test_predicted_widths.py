@@ -14,7 +14,7 @@ from host.export.toml import dumps
 from host.planning.point_widths import PointPromise, promise_points
 from host.planning.predicted_widths import Prediction, predict_widths
 from host.sysid.pipeline import flight_preparation
-from host.sysid.reconstruction.reconstruction import Compatibility, reconstruct
+from host.sysid.reconstruction import Compatibility, reconstruct
 from host.twin.testcard.cards import Card, parse
 
 DOCUMENT: dict[str, object] = {

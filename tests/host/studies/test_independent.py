@@ -8,7 +8,7 @@ from host.aircraft.mass_properties import airframe_data
 from host.instrument.deviations import sensor_error_model
 from host.physical.calibration import load_calibration
 from host.sysid.answer import judge
-from host.sysid.reconstruction.path_preparation import density_share
+from host.sysid.reconstruction import density_share
 from studies import independent
 from studies.foreign.aeroplane import DENSITY_KGPM3, TRAINER, motion
 from studies.foreign.flight import COLUMNS, SPEED_MPS, STEP_S, Air, derivatives, fly

@@ -16,7 +16,7 @@ from host.sysid.linear import Answer
 from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import LinearModel
 from host.sysid.pipeline import aircraft_data, at_hand, flight_preparation, identify_columns
-from host.sysid.reconstruction.reconstruction import Compatibility
+from host.sysid.reconstruction import Compatibility
 
 KNOWN = aircraft_data("ultrastick25e")
 

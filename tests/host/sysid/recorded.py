@@ -6,7 +6,7 @@ import numpy as np
 from host.aircraft.mass_properties import airframe_data
 from host.instrument.deviations import sensor_error_model
 from host.readers.even_grid import even_columns
-from host.sysid.reconstruction.reconstruction import Compatibility, reconstruct
+from host.sysid.reconstruction import Compatibility, reconstruct
 from host.twin.virtual import VirtualFlight, virtual_flight
 
 NAME = "ultrastick25e"

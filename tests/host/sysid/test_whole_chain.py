@@ -12,13 +12,13 @@ from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.cli import main
 from host.errors import IdentificationError
 from host.sysid import Maneuver, fit
-from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
+from host.sysid.aerodynamics import coefficient_parts, coefficients
 from host.sysid.flight import read_columns
 from host.sysid.linear import Answer
 from host.sysid.maneuvers import detect_maneuvers, grade
 from host.sysid.models import Trim, read_model
 from host.sysid.models.templates import longitudinal
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import OutputProblem
 from host.sysid.reconstruction.position_correction import transfer_to_cg
 
 from tests.host.sysid.at_hand import identify

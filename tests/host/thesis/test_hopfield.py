@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from host.errors import IdentificationError
 from host.sysid import fit
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import OutputProblem
 from host.thesis.error_figures import thesis_program_error_percent
 from host.thesis.hopfield import (
     LAMBDA,

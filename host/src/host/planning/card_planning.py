@@ -22,8 +22,7 @@ from host.sysid.estimators.start_values import start_values
 from host.sysid.models import LinearModel, Maneuver
 from host.sysid.models import Trim as Condition
 from host.sysid.models.templates import lateral, longitudinal
-from host.sysid.numerics.output_error import covariance_of_free, minimise
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import OutputProblem, covariance_of_free, minimise
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.flight.pilot import Window
 from host.twin.outcome.ideal import true_table

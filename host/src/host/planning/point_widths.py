@@ -31,9 +31,8 @@ from host.planning.predicted_widths import (
     flown_columns,
     predict_widths,
 )
-from host.sysid.coefficients import CoefficientModel, standard_model
+from host.sysid.coefficients import CoefficientModel, ResidualSpectra, standard_model
 from host.sysid.coefficients.coefficient_estimator import coefficient_estimator
-from host.sysid.coefficients.window_spectra import ResidualSpectra
 from host.sysid.flight import reconstruct_flight
 from host.sysid.maneuvers import DetectedManeuver, detect_maneuvers
 from host.twin.testcard.cards import Card, Segment

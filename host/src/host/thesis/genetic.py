@@ -12,7 +12,7 @@ from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.estimators.output_error_fit import fit_output_error, sample_periods
 from host.sysid.models import FitResult, LinearModel, Maneuver
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import OutputProblem
 
 POPULATION = 40
 GENERATIONS = 60  # from far away the best is then within 3 % of the valley, six seeds of six

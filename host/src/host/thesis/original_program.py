@@ -8,7 +8,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.models import LinearModel, Maneuver
-from host.sysid.numerics.discretisation import discretise
+from host.sysid.numerics import discretise
 from host.sysid.numerics.recursion import simulate
 from host.thesis.error_figures import thesis_program_error_percent
 from host.thesis.network_run import NetworkRun

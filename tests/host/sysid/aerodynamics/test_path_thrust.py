@@ -8,7 +8,7 @@ from host.aircraft.mass_properties import Condition, airframe_data
 from host.aircraft.powerplant import powerplant
 from host.constants import GRAVITY_MPS2
 from host.readers.even_grid import even_columns
-from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
+from host.sysid.aerodynamics import coefficient_parts, coefficients
 from host.sysid.aerodynamics.path_thrust import USUAL_DRAG, PathThrust, path_thrust
 from host.sysid.models import FitResult, Trim, free_model
 from host.twin.testcard.cards import load

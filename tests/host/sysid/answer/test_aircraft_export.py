@@ -20,7 +20,7 @@ from host.arrays import Array
 from host.cli import main
 from host.export import toml as tomlout
 from host.readers.even_grid import even_columns
-from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
+from host.sysid.aerodynamics import Coefficient, CoefficientTable
 from host.sysid.answer import read_truth, true_coefficients
 from host.sysid.answer.aircraft_export import AXES, CONTROLS, aircraft_document
 from host.sysid.coefficients.coefficient_fit import MeanCondition, ThrustEffect

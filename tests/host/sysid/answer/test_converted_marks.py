@@ -7,7 +7,7 @@ from dataclasses import replace
 from itertools import product
 
 import pytest
-from host.sysid.aerodynamics.coefficient_table import Coefficient
+from host.sysid.aerodynamics import Coefficient
 from host.sysid.answer import CAREFUL, MARKS, TRUSTED, answer_document, json_text
 from host.sysid.answer.converted_marks import converted_marks
 from host.sysid.answer.marks import SMALL, UNSURE

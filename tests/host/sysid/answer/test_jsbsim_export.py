@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from host.aircraft.file import load
 from host.aircraft.local_derivatives import local_derivatives
-from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
+from host.sysid.aerodynamics import Coefficient, CoefficientTable
 from host.sysid.answer.aircraft_export import save_aircraft
 
 from tests.host.sysid.answer.jsbsim_air import JSBSIM_AIR

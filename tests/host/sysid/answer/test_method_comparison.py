@@ -9,7 +9,7 @@ from host.sysid.answer.method_comparison import method_table
 from host.sysid.estimators import methods
 from host.sysid.flight import read_columns
 from host.sysid.linear import STAGED, Answer
-from host.sysid.maneuvers.maneuver_selection import select_maneuvers
+from host.sysid.maneuvers import select_maneuvers
 
 from host import compiled
 from tests.host.sysid.at_hand import identify

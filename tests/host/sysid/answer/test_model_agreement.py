@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from host.sysid.aerodynamics.coefficient_table import Coefficient
+from host.sysid.aerodynamics import Coefficient
 from host.sysid.answer import CAREFUL, TRUSTED
 from host.sysid.answer.marks import UNSURE
 from host.sysid.answer.model_agreement import derivative_of, disagreements_of_models

@@ -6,7 +6,7 @@ import pytest
 from host.physical.recording import AUTOPILOT, FOREIGN
 from host.sysid.answer.pitot_parameter import pitot_lines
 from host.sysid.flight import ReconstructedFlight
-from host.sysid.reconstruction.reconstruction import Compatibility, SensorErrorEstimate
+from host.sysid.reconstruction import Compatibility, SensorErrorEstimate
 
 
 def flown(source: str, maker: str = AUTOPILOT) -> ReconstructedFlight:

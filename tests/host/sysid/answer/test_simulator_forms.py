@@ -22,7 +22,7 @@ from host.aircraft.airframe import Airframe
 from host.aircraft.file import load
 from host.aircraft.local_derivatives import coefficients
 from host.errors import IdentificationError
-from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
+from host.sysid.aerodynamics import Coefficient, CoefficientTable
 from host.sysid.answer import OutputPaths, check_outputs
 from host.sysid.answer.aircraft_export import save_aircraft
 from host.sysid.answer.simulator_forms import write_form

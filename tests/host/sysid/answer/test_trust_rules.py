@@ -12,7 +12,7 @@ from host.sysid.checks import Finding
 from host.sysid.estimators.servo_parameters import SERVO, ServoEstimate, ServoNumber
 from host.sysid.linear import Answer
 from host.sysid.models import Trim, template
-from host.sysid.validation.prediction_limits import Prediction
+from host.sysid.validation import Prediction
 from studies.wrong_flights import LinearFlight, fly
 
 from tests.host.sysid.at_hand import identify

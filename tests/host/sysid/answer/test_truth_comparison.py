@@ -6,7 +6,7 @@ from typing import cast
 
 import numpy as np
 import pytest
-from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
+from host.sysid.aerodynamics import Coefficient, CoefficientTable
 from host.sysid.answer.truth_comparison import (
     as_flown,
     compared_coefficients,

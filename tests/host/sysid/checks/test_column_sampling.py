@@ -13,7 +13,7 @@ from host.sysid.flight import read_flight_columns
 from host.sysid.linear import Answer as LinearAnswer
 from host.sysid.models import Maneuver, Trim
 from host.sysid.models.templates import longitudinal
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import OutputProblem
 
 import host
 

@@ -9,9 +9,7 @@ import pandas as pd
 import pytest
 from host.cli import main
 from host.errors import IdentificationError
-from host.sysid.checks import CHECKS, accepted_checks, open_channels
-from host.sysid.checks.finding_consequences import checked
-from host.sysid.checks.unit_sign_checks import check
+from host.sysid.checks import CHECKS, accepted_checks, check, checked, open_channels
 
 import host
 from tests.host.logs import ROOT

@@ -19,8 +19,7 @@ from host.sysid.checks.feedback_findings import feedback_findings
 from host.sysid.coefficients import CoefficientAnswer
 from host.sysid.flight import read_flight_columns
 from host.sysid.linear import Answer
-from host.sysid.maneuvers import detect_maneuvers
-from host.sysid.maneuvers.maneuver_selection import select_maneuvers
+from host.sysid.maneuvers import detect_maneuvers, select_maneuvers
 from host.sysid.models import Term
 from studies.wrong_flights import fly
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from host.arrays import Array
-from host.sysid.checks.kinematic_checks import consistent
+from host.sysid.checks import consistent
 from scipy.integrate import solve_ivp
 
 DT_S = 0.025

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from host.cli import main
 from host.readers.column_map import UNITS
-from host.sysid.checks import CHECKS, Finding, open_channels
-from host.sysid.checks.finding_consequences import checked
+from host.sysid.checks import CHECKS, Finding, checked, open_channels
 from host.sysid.checks.unit_sign_checks import SURFACES, check
 from host.sysid.flight import read_columns
 from studies.foreign.flight import Air, fly

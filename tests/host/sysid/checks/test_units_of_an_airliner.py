@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 from host.constants import GRAVITY_MPS2
-from host.sysid.checks.finding_consequences import checked
+from host.sysid.checks import check, checked
 from host.sysid.checks.side_force import unlikely_factors
-from host.sysid.checks.unit_sign_checks import check
 from scipy.signal import lfilter
 
 Columns = dict[str, np.ndarray]

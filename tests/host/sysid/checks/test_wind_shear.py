@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from host.constants import GRAVITY_MPS2
-from host.sysid.checks.unit_sign_checks import check
+from host.sysid.checks import check
 
 Columns = dict[str, np.ndarray]
 SPEED_MPS, STEP_S, LONG_S, GUST_M = 150.0, 0.02, 60.0, 250.0

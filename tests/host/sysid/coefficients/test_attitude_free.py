@@ -8,11 +8,9 @@ from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
 from host.readers.even_grid import even_columns
-from host.sysid.coefficients import CoefficientFit, standard_model
+from host.sysid.coefficients import CoefficientFit, Window, fit_coefficients, standard_model
 from host.sysid.coefficients.aero_equations import KINEMATIC, Equation, FlightHistory, equations
-from host.sysid.coefficients.coefficient_search import fit_coefficients
-from host.sysid.coefficients.window_spectra import Window
-from host.sysid.reconstruction.inverse_sensor_model import Record
+from host.sysid.reconstruction import Record
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
 

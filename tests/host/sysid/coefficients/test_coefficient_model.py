@@ -19,12 +19,12 @@ from host.readers.even_grid import even_columns
 from host.sysid.coefficients import (
     CoefficientFit,
     CoefficientModel,
+    Window,
+    fit_coefficients,
     standard_model,
 )
 from host.sysid.coefficients.coefficient_fit import Derivative
-from host.sysid.coefficients.coefficient_search import fit_coefficients
 from host.sysid.coefficients.trim_derivatives import TrimMeans, derivatives_at_trim
-from host.sysid.coefficients.window_spectra import Window
 from host.sysid.models import read_model
 from host.sysid.models.coefficient_model import parse_term
 from host.twin.testcard.cards import load

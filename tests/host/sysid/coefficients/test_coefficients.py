@@ -12,9 +12,8 @@ from host.constants import NORMAL_95
 from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, deviations, sensor_error_model
 from host.readers.even_grid import even_columns
-from host.sysid.coefficients import CoefficientFit
+from host.sysid.coefficients import CoefficientFit, Window, window_transform
 from host.sysid.coefficients.coefficient_search import fit_coefficients, search_coefficients
-from host.sysid.coefficients.window_spectra import Window, window_transform
 from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.reconstruction.inverse_sensor_model import (
     Record,

@@ -9,8 +9,7 @@ from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
 from host.readers.even_grid import even_columns
-from host.sysid.coefficients import CoefficientFit
-from host.sysid.coefficients.coefficient_search import fit_coefficients
+from host.sysid.coefficients import CoefficientFit, fit_coefficients
 from host.sysid.coefficients.deletion_diagnostics import (
     FinalStep,
     cross_validation,
@@ -30,7 +29,7 @@ from host.sysid.coefficients.window_spectra import (
     window_transform,
 )
 from host.sysid.numerics.maneuver_agreement import scatter_test
-from host.sysid.reconstruction.inverse_sensor_model import Spectrum
+from host.sysid.reconstruction import Spectrum
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
 

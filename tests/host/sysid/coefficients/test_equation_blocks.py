@@ -21,7 +21,7 @@ from host.sysid.coefficients.window_spectra import (
     WindowTransform,
     window_transform,
 )
-from host.sysid.reconstruction.inverse_sensor_model import Spectrum
+from host.sysid.reconstruction import Spectrum
 
 POSITIONS = {"Cm": np.array([0, 1]), "w": np.zeros(0, dtype=np.int64)}
 TERMS, GUSTS, ERRORS = 2, 3, 4  # gusts of one window

@@ -7,7 +7,7 @@ from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
-from host.sysid.coefficients import standard_model
+from host.sysid.coefficients import Window, WindowTransform, standard_model, window_transform
 from host.sysid.coefficients.aero_equations import FlightHistory, equations
 from host.sysid.coefficients.slow_gusts import (
     GUST_TERMS,
@@ -16,8 +16,7 @@ from host.sysid.coefficients.slow_gusts import (
     gust_regressors,
     gust_strength,
 )
-from host.sysid.coefficients.window_spectra import Window, WindowTransform, window_transform
-from host.sysid.reconstruction.inverse_sensor_model import Record
+from host.sysid.reconstruction import Record
 from numpy.polynomial import legendre
 
 NAME = "ultrastick25e"

@@ -13,7 +13,7 @@ from host.arrays import Array
 from host.errors import IdentificationError
 from host.instrument.deviations import sensor_error_model
 from host.instrument.error_list import conversion_errors
-from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
+from host.sysid.aerodynamics import coefficient_parts, coefficients
 from host.sysid.conversion.derivative_conversion import (
     ConversionPoint,
     Quantities,

@@ -11,7 +11,7 @@ from host.sysid.answer import TRUSTED
 from host.sysid.errors import systematic_residuals
 from host.sysid.linear import Answer
 from host.sysid.models import Maneuver, Trim, template
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import OutputProblem
 from host.sysid.reconstruction.reconstruction import by_calibration_alone
 from studies.foreign.flight import Air
 from studies.foreign.instrument import SENSORS_FILE

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from host.sysid.errors.one_step import one_step_of
+from host.sysid.errors import one_step_of
 from host.sysid.estimators import fit
 from host.sysid.models import LinearModel, Maneuver, Parameter, Term, Trim, template
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import OutputProblem
 
 TRIM = Trim(18.0)
 TRUE = {

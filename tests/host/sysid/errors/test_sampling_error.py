@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.sysid.models import Maneuver, read_model
-from host.sysid.numerics.ar_noise import ArNoise
-from host.sysid.numerics.model_problems import output_problem
+from host.sysid.numerics import ArNoise, output_problem
 from scipy import signal
 
 import host

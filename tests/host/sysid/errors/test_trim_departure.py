@@ -12,7 +12,7 @@ from host.aircraft.powerplant import powerplant
 from host.errors import IdentificationError
 from host.instrument.deviations import unknown_sensors
 from host.readers.even_grid import even_columns
-from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
+from host.sysid.aerodynamics import coefficient_parts, coefficients
 from host.sysid.answer import true_coefficients
 from host.sysid.errors.trim_departure import spin_of
 from host.sysid.estimators import fit
@@ -23,7 +23,7 @@ from host.sysid.linear.linear_model import imu_place_m, without_attitude
 from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import FitResult, Trim, template
 from host.sysid.models.residual_delays import STANDARD_DELAYS
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import OutputProblem
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
 from studies import wrong_flights

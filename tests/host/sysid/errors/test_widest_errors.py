@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
+from host.sysid.aerodynamics import ShiftedEstimate
 from host.sysid.errors import add_systematic_covariance
 from host.sysid.errors.widest_errors import BESIDE, NOISE, widest_errors
 from host.sysid.models import FitResult, free_model

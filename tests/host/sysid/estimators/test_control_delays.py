@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.sysid.estimators.output_error_fit import fit_output_error
+from host.sysid.estimators import fit_output_error
 from host.sysid.models import LinearModel, Maneuver, read_model
-from host.sysid.numerics.model_problems import output_problem
+from host.sysid.numerics import output_problem
 
 pytestmark = pytest.mark.usefixtures("machine_code")
 TEXT = """\

@@ -8,7 +8,7 @@ from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.estimators import fit
 from host.sysid.models import Maneuver, NonlinearModel, equations_from, model_from
-from host.sysid.numerics.equation_filter_problem import EquationFilterProblem
+from host.sysid.numerics import EquationFilterProblem
 from host.sysid.numerics.process_noise import discrete_noise
 from scipy import linalg
 from scipy.signal import lfilter

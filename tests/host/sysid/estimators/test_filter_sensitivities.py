@@ -5,9 +5,7 @@ import pytest
 from host.sysid.estimators.filter_error import fit_filter_error
 from host.sysid.estimators.gust_model import gust_model
 from host.sysid.models import LinearModel, Maneuver, Trim, template
-from host.sysid.numerics.filter_problem import FilterProblem
-from host.sysid.numerics.innovation_problem import InnovationLikelihood
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import FilterProblem, InnovationLikelihood, OutputProblem
 
 KNOWN = {"Z_alpha": -8.0, "M_alpha": -60.0, "M_q": -8.0, "M_de": -70.0, "Z_de": -0.5}
 KNOWN |= {"D_V": -0.2, "D_alpha": -5.0, "Z_V": -0.07, "imu_x_m": 0.02, "imu_z_m": -0.01}

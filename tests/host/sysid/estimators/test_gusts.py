@@ -9,7 +9,7 @@ from host.aircraft.linearisation import linearise
 from host.aircraft.mass_properties import Condition
 from host.sysid.estimators.filter_error import information_at
 from host.sysid.estimators.gust_model import ROLL_GUST
-from host.sysid.numerics.filter_problem import FilterProblem
+from host.sysid.numerics import FilterProblem
 from host.sysid.numerics.process_noise import discrete_noise
 from scipy import linalg
 from studies.gusts import AXES, DT_S, fly, gusty_aircraft, spectrum

@@ -7,8 +7,7 @@ import pytest
 from host.arrays import Array
 from host.sysid.estimators import fit
 from host.sysid.models import Maneuver, NonlinearModel, equations_from
-from host.sysid.numerics.equation_filter_problem import EquationFilterProblem
-from host.sysid.numerics.nonlinear_problem import NonlinearProblem
+from host.sysid.numerics import EquationFilterProblem, NonlinearProblem
 from scipy import linalg
 
 DT_S, SAMPLES = 0.05, 60

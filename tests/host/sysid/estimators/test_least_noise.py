@@ -13,7 +13,7 @@ from host.sysid.flight import flown_maneuvers, reconstruct_flight
 from host.sysid.flight.reconstructed_flight import OWN_ATTITUDE_RAD
 from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import Maneuver, Trim, template
-from host.sysid.reconstruction.reconstruction import Compatibility
+from host.sysid.reconstruction import Compatibility
 from scipy import signal
 
 DT_S, FINE = 0.02, 10

@@ -5,10 +5,8 @@ import pytest
 from host.errors import IdentificationError
 from host.sysid import FitResult, Maneuver, fit, methods
 from host.sysid.estimators.kalman import innovation_inflation
+from host.sysid.numerics import FilterProblem, OutputProblem, minimise
 from host.sysid.numerics.chirp_z import transform
-from host.sysid.numerics.filter_problem import FilterProblem
-from host.sysid.numerics.output_error import minimise
-from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.riccati import predicted_covariance
 from scipy import linalg, signal
 from studies.aircraft import navion, navion_free, navion_structured

@@ -9,8 +9,8 @@ from host.sysid.estimators.homotopy import homotopy_start, stabilised_model
 from host.sysid.estimators.multistart import multistart, white_cost
 from host.sysid.estimators.start_values import start_values
 from host.sysid.models import LinearModel, Maneuver, free_model
+from host.sysid.numerics import OutputProblem
 from host.sysid.numerics.output_error import Optimum, minimise
-from host.sysid.numerics.output_error_problem import OutputProblem
 from studies.aircraft import navion_free
 from studies.data import noisy
 from studies.inputs import SHAPES

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from host.errors import IdentificationError
 from host.sysid import Maneuver, Parameter, fit
-from host.sysid.estimators.output_error_fit import fit_output_error
+from host.sysid.estimators import fit_output_error
 from host.sysid.estimators.start_values import start_values
-from host.sysid.numerics.output_error import covariance_of_free, minimise
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import OutputProblem, covariance_of_free, minimise
 from scipy import optimize
 from studies.aircraft import navion_free, navion_structured
 from studies.data import TRUTH, clean, noisy

@@ -23,8 +23,8 @@ from host.sysid.estimators.servo_parameters import (
     estimate_servo,
 )
 from host.sysid.models import FitResult, LinearModel, Maneuver, Trim, template
-from host.sysid.numerics.output_error_problem import OutputProblem
-from host.sysid.reconstruction.servo_response import behind_servos
+from host.sysid.numerics import OutputProblem
+from host.sysid.reconstruction import behind_servos
 
 import host
 

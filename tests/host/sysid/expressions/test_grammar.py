@@ -7,10 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from host.sysid.expressions.equation_code import EquationNodes
-from host.sysid.expressions.evaluation import evaluate
+from host.sysid.expressions import EquationNodes, evaluate, parse_expression
 from host.sysid.expressions.expression_graph import ExpressionError, ExpressionGraph
-from host.sysid.expressions.grammar import parse_expression
 
 NAMES = ("a", "b", "w")
 X, Y = (-2.0, -0.5, 0.4, 1.5), (0.3, -1.0, 2.0, 0.0)

@@ -9,7 +9,7 @@ from host.sysid.flight import FlownManeuver, ReconstructedFlight, with_filter_st
 from host.sysid.linear.linear_model import template_and_method
 from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import Trim, template
-from host.sysid.reconstruction.reconstruction import Compatibility
+from host.sysid.reconstruction import Compatibility
 from studies.wrong_flights import fly
 
 from tests.host.sysid.at_hand import identify

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import AirframeData
 from host.constants import GRAVITY_MPS2
-from host.sysid.aerodynamics.measured_thrust import with_thrust
+from host.sysid.aerodynamics import with_thrust
 from host.sysid.aerodynamics.thrust_terms import LEAST_SHARE, THRUST_BESIDE
 from host.sysid.linear import Answer
 from host.sysid.maneuvers import DetectedManeuver

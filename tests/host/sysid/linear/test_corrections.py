@@ -13,7 +13,7 @@ from host.cli import main
 from host.instrument.deviations import dynamic_pressure_share
 from host.instrument.instrument_errors import InstrumentErrors, standard_errors
 from host.sysid import Maneuver, fit
-from host.sysid.aerodynamics.coefficient_table import (
+from host.sysid.aerodynamics import (
     ShiftedEstimate,
     coefficient_parts,
     coefficients,
@@ -25,13 +25,13 @@ from host.sysid.errors.sampling_error import HOLD
 from host.sysid.linear import Answer, linear_answer, linear_model
 from host.sysid.models import Trim, template
 from host.sysid.models.residual_delays import STANDARD_DELAYS
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import OutputProblem
 from host.sysid.pipeline import flight_preparation
-from host.sysid.reconstruction.path_preparation import density_share
-from host.sysid.reconstruction.reconstruction import (
+from host.sysid.reconstruction import (
     Compatibility,
     NoAgreementError,
     SensorErrorEstimate,
+    density_share,
 )
 from host.sysid.reconstruction.sensor_corrections import (
     INSTANTANEOUS_ERRORS,

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from host.sysid.maneuvers import DetectedManeuver, detect_maneuvers
-from host.sysid.maneuvers.maneuver_selection import joined_windows
+from host.sysid.maneuvers import DetectedManeuver, detect_maneuvers, joined_windows
 from host.sysid.maneuvers.sustained_inputs import running_maximum
 from numpy.typing import NDArray
 from scipy import ndimage

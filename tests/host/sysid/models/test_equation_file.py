@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.errors import IdentificationError
-from host.sysid.estimators.output_error_fit import fit_output_error
+from host.sysid.estimators import fit_output_error
 from host.sysid.models import Maneuver, NonlinearModel, read_model
 from host.sysid.models.equation_text import equation_text
-from host.sysid.numerics.nonlinear_problem import NonlinearProblem
+from host.sysid.numerics import NonlinearProblem
 
 TEXT = """\
 kind = "equations"

@@ -10,7 +10,7 @@ from host.sysid import Maneuver, fit
 from host.sysid.models import model_from, read_model
 from host.sysid.models.model_text import model_text
 from host.sysid.models.parameter_units import parameter_unit
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import OutputProblem
 from host.sysid.validation.free_simulation import frozen_at
 
 BASE: dict[str, Any] = {

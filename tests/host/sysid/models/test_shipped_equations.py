@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from host.arrays import Array
 from host.sysid.models import Maneuver, NonlinearModel, read_model
-from host.sysid.numerics.nonlinear_problem import NonlinearProblem
+from host.sysid.numerics import NonlinearProblem
 
 FOLDER = Path(str(files("host.sysid.models").joinpath("equations")))
 G = 9.80665

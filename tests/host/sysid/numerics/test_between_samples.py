@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from host.arrays import Array
 from host.sysid.models import LinearModel, Maneuver, model_from
+from host.sysid.numerics import OutputProblem, minimise
 from host.sysid.numerics.between_samples import (
     left_between_samples,
     likely_jumps,
     with_jump,
     with_means_of_smooth_motion,
 )
-from host.sysid.numerics.output_error import minimise
-from host.sysid.numerics.output_error_problem import OutputProblem
 from scipy.signal import lfilter
 
 DT_S, SAMPLES, FINE = 0.05, 120, 20

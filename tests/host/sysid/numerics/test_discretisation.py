@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from host.sysid.models import LinearModel, Maneuver, Parameter, Term
 from host.sysid.models.state_space_model import DelayGroup
+from host.sysid.numerics import OutputProblem, discretise
 from host.sysid.numerics.ar_noise import ArNoise, ar_filter, autocovariance
-from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.fractional_delay import delay_columns, slope_by_delay
-from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.process_noise import discrete_noise
 from scipy import linalg, signal
 

@@ -7,12 +7,9 @@ import numpy as np
 import pytest
 from host.sysid.estimators import fit
 from host.sysid.models import LinearModel, Maneuver, equations_from
-from host.sysid.numerics.ar_noise import autocovariance
+from host.sysid.numerics import OutputProblem, autocovariance, minimise, output_problem
 from host.sysid.numerics.input_coherence import InputCoherence, block_means, input_coherence
 from host.sysid.numerics.input_regressors import input_regressors, lag_knots_s
-from host.sysid.numerics.model_problems import output_problem
-from host.sysid.numerics.output_error import minimise
-from host.sysid.numerics.output_error_problem import OutputProblem
 from scipy import signal
 from studies.aircraft import navion_structured
 from studies.coverage import coloured_noise

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from host.arrays import BoolArray
 from host.sysid.models import LinearModel, Maneuver, Parameter, Term
-from host.sysid.numerics.filter_problem import FilterProblem
-from host.sysid.numerics.innovation_problem import InnovationLikelihood
+from host.sysid.numerics import FilterProblem, InnovationLikelihood
 from host.sysid.numerics.process_noise import discrete_noise
 from host.sysid.numerics.restricted_likelihood import restricted_slopes
 from scipy import stats

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from host.sysid import FitResult, Maneuver, fit
+from host.sysid.numerics import OutputProblem
 from host.sysid.numerics.maneuver_agreement import (
     ManeuverAgreement,
     disagreement,
     maneuver_agreement,
 )
-from host.sysid.numerics.output_error_problem import OutputProblem
 from studies.aircraft import navion_structured
 from studies.data import TRUTH, noisy
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from host.sysid.estimators.output_error_fit import fit_output_error
+from host.sysid.estimators import fit_output_error
 from host.sysid.models import Maneuver, equations_from
-from host.sysid.numerics.nonlinear_problem import NonlinearProblem
+from host.sysid.numerics import NonlinearProblem
 from scipy import signal
 
 DT_S = 0.04

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from host.sysid.estimators.filter_error import fit_filter_error
 from host.sysid.models import LinearModel, Maneuver, Parameter, Term
-from host.sysid.numerics.filter_problem import FilterProblem
+from host.sysid.numerics import FilterProblem
 from host.sysid.numerics.restricted_likelihood import restricted_slopes
 
 DT_S, RECORD_S, RECORDS = 0.02, 2.5, 8

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 from host.sysid.models import Maneuver
-from host.sysid.numerics.ar_noise import ArNoise
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics import ArNoise, OutputProblem
 from host.sysid.numerics.score_variance import variance_ratio
 from studies.aircraft import navion_structured
 from studies.inputs import multistep_3211

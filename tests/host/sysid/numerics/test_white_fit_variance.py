@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from host.arrays import Array, IntArray
-from host.sysid.numerics.ar_noise import ArNoise
+from host.sysid.numerics import ArNoise
 from host.sysid.numerics.score_variance import _by_innovations, white_fit_variance
 from scipy.signal import lfilter
 

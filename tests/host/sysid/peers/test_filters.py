@@ -8,6 +8,7 @@ import pytest
 from host.sysid import LinearModel, Maneuver, Parameter, Term, fit
 from host.sysid.models.modal_analysis import modes_of
 from host.sysid.models.state_space_model import DelayGroup
+from host.sysid.numerics import FilterProblem, OutputProblem
 from host.sysid.numerics.ar_noise import (
     ArNoise,
     autocovariance,
@@ -15,8 +16,6 @@ from host.sysid.numerics.ar_noise import (
     fit_ar,
     lagged_moments,
 )
-from host.sysid.numerics.filter_problem import FilterProblem
-from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.process_noise import discrete_noise
 from host.sysid.numerics.riccati import predicted_covariance
 from scipy import signal

@@ -12,7 +12,7 @@ import pytest
 from host.errors import IdentificationError
 from host.sysid.answer import OutputPaths
 from host.sysid.models import Maneuver, read_model
-from host.sysid.numerics.model_problems import output_problem
+from host.sysid.numerics import output_problem
 from scipy import integrate
 
 import host

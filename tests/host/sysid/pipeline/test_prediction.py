@@ -13,8 +13,8 @@ from host.errors import IdentificationError
 from host.sysid import Maneuver
 from host.sysid.models import model_from
 from host.sysid.models.theil_inequality import theil_inequality
+from host.sysid.validation import window_errors
 from host.sysid.validation.free_simulation import free_runs, frozen_at
-from host.sysid.validation.window_prediction import window_errors
 from host.twin.virtual import virtual_flight
 from scipy.signal import lsim
 

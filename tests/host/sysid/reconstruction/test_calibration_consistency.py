@@ -5,7 +5,8 @@ import pytest
 from host.aircraft.mass_properties import airframe_data
 from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
-from host.sysid.checks.agreement_findings import calibration_findings
+from host.sysid.checks import calibration_findings
+from host.sysid.reconstruction import prior
 from host.sysid.reconstruction.calibration_consistency import (
     OBSERVABLE_GROUPS,
     SIGNIFICANCE,
@@ -13,7 +14,6 @@ from host.sysid.reconstruction.calibration_consistency import (
     calibration_lines,
     consistency_tests,
 )
-from host.sysid.reconstruction.path_preparation import prior
 from host.sysid.reconstruction.reconstruction import (
     Compatibility,
     compatibility_document,

@@ -10,9 +10,9 @@ import pytest
 from host.errors import IdentificationError
 from host.sysid.pipeline import ReadingOptions, aircraft_data, prepare, read_flight
 from host.sysid.pipeline.flight_preparation import PreparedFlight
+from host.sysid.reconstruction import Compatibility
 from host.sysid.reconstruction.flow_angles import FlowAngles, flying, reconstruct_flow_angles
 from host.sysid.reconstruction.linear_smoother import Step, smooth
-from host.sysid.reconstruction.reconstruction import Compatibility
 from host.twin.flight.fly import fly
 from host.twin.outcome.autopilot_logs import write_autopilot_log
 from host.twin.sensors.local_flow import air_data

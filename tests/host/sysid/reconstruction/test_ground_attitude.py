@@ -15,13 +15,13 @@ from host.arrays import Array
 from host.constants import GRAVITY_MPS2, NORMAL_95
 from host.sysid.pipeline import ReadingOptions, aircraft_data, prepare, read_flight
 from host.sysid.pipeline.flight_preparation import PreparedFlight
+from host.sysid.reconstruction import Compatibility, SensorErrorEstimate
 from host.sysid.reconstruction.ground_attitude import (
     BIAS,
     TILT,
     standstill,
     update_by_standstill,
 )
-from host.sysid.reconstruction.reconstruction import Compatibility, SensorErrorEstimate
 from host.twin.flight.fly import fly
 from host.twin.outcome.autopilot_logs import write_autopilot_log
 from host.twin.outcome.ideal import true_table

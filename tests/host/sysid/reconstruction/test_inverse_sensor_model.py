@@ -5,7 +5,7 @@ import pytest
 from host.aircraft.mass_properties import airframe_data
 from host.instrument.deviations import deviations, sensor_error_model
 from host.sysid.coefficients.coefficient_search import COLUMNS
-from host.sysid.reconstruction.inverse_sensor_model import Record, apply_sensor_errors
+from host.sysid.reconstruction import Record, apply_sensor_errors
 
 NAME = "ultrastick25e"
 

@@ -14,9 +14,8 @@ from host.sysid.estimators.filter_error_gust import fit_with_gust
 from host.sysid.estimators.gust_model import gust_model
 from host.sysid.estimators.gust_penetration import with_gust_penetration
 from host.sysid.models import FitResult, LinearModel, Trim, template
+from host.sysid.reconstruction import INSTANTANEOUS_ERRORS, Compatibility, SensorErrorEstimate
 from host.sysid.reconstruction.path_preparation import compensate_lowpass
-from host.sysid.reconstruction.reconstruction import Compatibility, SensorErrorEstimate
-from host.sysid.reconstruction.sensor_corrections import INSTANTANEOUS_ERRORS
 from host.sysid.reconstruction.sensor_dynamics import (
     IMU_DELAY,
     columns_at_cg,

@@ -6,7 +6,7 @@ import pytest
 from host.instrument.deviations import unknown_sensors
 from host.instrument.recording_notes import recording_notes
 from host.physical.recording import Recording
-from host.sysid.reconstruction.path_preparation import prior
+from host.sysid.reconstruction import prior
 
 
 def test_priors_of_a_table_of_others_are_wide() -> None:

@@ -7,10 +7,9 @@ import pytest
 from host.sysid.estimators import fit
 from host.sysid.linear import Answer
 from host.sysid.models import LinearModel, Maneuver, model_from
-from host.sysid.numerics.ar_noise import ArNoise, autocovariance
+from host.sysid.numerics import ArNoise, autocovariance
 from host.sysid.numerics.input_coherence import input_coherence
-from host.sysid.validation.free_simulation import free_responses
-from host.sysid.validation.noise_model_limits import random_errors
+from host.sysid.validation import free_responses, random_errors
 from host.sysid.validation.prediction_limits import power_freedom, predictions, random_noise
 from studies.wrong_flights import fly
 

@@ -29,7 +29,7 @@ from host.sysid.answer import doubted_by_findings
 from host.sysid.checks import finding_document
 from host.sysid.coefficients import CoefficientFit
 from host.sysid.pipeline import Identification, identify
-from host.sysid.reconstruction.sensor_dynamics import SERVO_DELAY
+from host.sysid.reconstruction import SERVO_DELAY
 
 _GPS_EPOCH = datetime(1980, 1, 6, tzinfo=UTC)
 _POSTERIOR_PRIOR_RATIO = 0.9  # an estimate whose deviation is nearly its prior's is left out

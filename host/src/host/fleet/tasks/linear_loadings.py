@@ -15,7 +15,7 @@ from host.constants import NORMAL_95
 from host.fleet.tasks.estimate_loadings import LoadedEstimates, split_covariance
 from host.instrument.error_list import VANE, conversion_cause, error_kinds
 from host.instrument.instrument_errors import InstrumentErrors
-from host.sysid.aerodynamics.coefficient_table import CoefficientParts
+from host.sysid.aerodynamics import CoefficientParts
 from host.sysid.linear import Answer
 
 

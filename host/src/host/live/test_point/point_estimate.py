@@ -27,7 +27,7 @@ from host.planning.point_widths import (
     single_point_card,
 )
 from host.planning.predicted_widths import LIGHT_GUSTS_MPS, FlightWidth, PredictedWidth
-from host.sysid.coefficients.window_spectra import ResidualSpectra
+from host.sysid.coefficients import ResidualSpectra
 from host.sysid.maneuvers import DetectedManeuver
 from host.twin.testcard.cards import Card, Segment
 

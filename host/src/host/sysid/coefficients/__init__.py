@@ -12,6 +12,13 @@ if TYPE_CHECKING:
         CoefficientEstimator,
     )
     from host.sysid.coefficients.coefficient_fit import CoefficientFit
+    from host.sysid.coefficients.coefficient_search import fit_coefficients
+    from host.sysid.coefficients.window_spectra import (
+        ResidualSpectra,
+        Window,
+        WindowTransform,
+        window_transform,
+    )
     from host.sysid.models.coefficient_model import CoefficientModel, standard_model
 
 __all__ = [
@@ -19,7 +26,12 @@ __all__ = [
     "CoefficientEstimator",
     "CoefficientFit",
     "CoefficientModel",
+    "ResidualSpectra",
+    "Window",
+    "WindowTransform",
+    "fit_coefficients",
     "standard_model",
+    "window_transform",
 ]
 
 __getattr__ = lazily(
@@ -29,6 +41,11 @@ __getattr__ = lazily(
         "CoefficientEstimator": "coefficient_estimator",
         "CoefficientFit": "coefficient_fit",
         "CoefficientModel": ".models.coefficient_model",
+        "ResidualSpectra": "window_spectra",
+        "Window": "window_spectra",
+        "WindowTransform": "window_spectra",
+        "fit_coefficients": "coefficient_search",
         "standard_model": ".models.coefficient_model",
+        "window_transform": "window_spectra",
     },
 )

@@ -7,6 +7,7 @@ from host.faces import lazily
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from host.sysid.errors.one_step import one_step_of
     from host.sysid.errors.systematic_errors import (
         add_systematic_covariance,
         systematic_error_shifts,
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "add_systematic_covariance",
+    "one_step_of",
     "systematic_error_shifts",
     "systematic_residuals",
 ]
@@ -23,6 +25,7 @@ __getattr__ = lazily(
     __name__,
     {
         "add_systematic_covariance": "systematic_errors",
+        "one_step_of": "one_step",
         "systematic_error_shifts": "systematic_errors",
         "systematic_residuals": "systematic_errors",
     },

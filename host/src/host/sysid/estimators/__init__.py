@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from host.sysid.estimators.method_fit import fit
     from host.sysid.estimators.method_options import read_options
     from host.sysid.estimators.method_registry import methods
+    from host.sysid.estimators.output_error_fit import fit_output_error
     from host.sysid.estimators.regression import regression_equations
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "MethodOption",
     "fit",
     "fit_equation_error",
+    "fit_output_error",
     "methods",
     "number",
     "numbers",
@@ -42,6 +44,7 @@ __getattr__ = lazily(
         "MethodOption": "estimation_method",
         "fit": "method_fit",
         "fit_equation_error": "equation_error",
+        "fit_output_error": "output_error_fit",
         "methods": "method_registry",
         "number": "estimation_method",
         "numbers": "estimation_method",

@@ -9,8 +9,17 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from host.sysid.maneuvers.maneuver_detection import AXES, DetectedManeuver, detect_maneuvers
     from host.sysid.maneuvers.maneuver_grade import Grade, grade
+    from host.sysid.maneuvers.maneuver_selection import joined_windows, select_maneuvers
 
-__all__ = ["AXES", "DetectedManeuver", "Grade", "detect_maneuvers", "grade"]
+__all__ = [
+    "AXES",
+    "DetectedManeuver",
+    "Grade",
+    "detect_maneuvers",
+    "grade",
+    "joined_windows",
+    "select_maneuvers",
+]
 
 __getattr__ = lazily(
     __name__,
@@ -20,5 +29,7 @@ __getattr__ = lazily(
         "Grade": "maneuver_grade",
         "detect_maneuvers": "maneuver_detection",
         "grade": "maneuver_grade",
+        "joined_windows": "maneuver_selection",
+        "select_maneuvers": "maneuver_selection",
     },
 )
