@@ -108,7 +108,7 @@ def airspeed_scale(
     ]
     if not tests:
         return None
-    own = np.array([sum(t.deviance(part, f, within) for t, part, within in tests) for f in TRIED])
+    own = np.sum([t.deviances(part, TRIED, within) for t, part, within in tests], axis=0)
     claimed = _claimed(flown, instrument)
     (factor, least), (_, within) = _least(own), _least(own + ((TRIED - 1.0) / claimed) ** 2)
     return AirspeedScale(factor, claimed, max(within - least, 0.0))

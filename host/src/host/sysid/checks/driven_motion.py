@@ -25,6 +25,7 @@ LAGS_STEPS = (0.0, 1.5, 4.0, 10.0, 30.0, 100.0)  # of first order, behind a surf
 ROWS_EACH = 8  # for each number that is fitted: with fewer it explains gusts too
 SENSOR_SHARE, SENSOR_DELAY_S = 0.1, 0.03  # scale, delay and place of right sensors, one deviation
 UNKNOWN_SHARE = 0.1  # of a motion, that they make of it in other ways
+REPEATS = 1e-10  # of the largest on a triangle's diagonal: the past may repeat itself
 SHORTEST_S = 19.0  # of 20 with its ends: a trend of a shorter record is explained by chance
 CERTAIN = 9.0  # of a chi-square of one unknown: three deviations
 LIKELIER = 1.0  # of the same, one deviation: below it two units are alike
@@ -100,45 +101,51 @@ class DrivenTest:
             self._delayed.append(self._split(delay_s * np.gradient(one, law.step_s))[0])
         self._errors = [self._split(error)[0] for error in law.sensors]
 
-    def misfit(self, scaled: str = "", factor: float = 1.0) -> float:
-        """Return how many deviations squared what surfaces explain of the identity is from none.
+    def misfit(self) -> float:
+        """Return how many deviations squared what surfaces explain of the identity is from none."""
+        return float(self.misfits("", [1.0])[0])
 
-        A part that counts `factor` times has no scale beside it.
+    def misfits(self, scaled: str, factors: Sequence[float] | Array) -> Array:
+        """Return the same where a part, or a term of one, counts so many times, one a factor.
+
+        It has no scale beside it then.
         """
         shares = {name: SENSOR_SHARE for name in self.parts if name != scaled}
         shares |= {} if scaled else {"": SENSOR_SHARE}
-        off, covariance = self._explained(
-            scaled, factor, SensorTolerances(shares, 1.0, UNKNOWN_SHARE)
-        )
-        return float(off @ np.linalg.solve(covariance, off))
+        within = SensorTolerances(shares, 1.0, UNKNOWN_SHARE)
+        return _squared(*self._explained(scaled, factors, within))
 
-    def deviance(self, scaled: str, factor: float, within: SensorTolerances) -> float:
-        """Return minus twice the logarithm of the likelihood of a factor, but for a constant."""
-        off, covariance = self._explained(scaled, factor, within)
-        return float(off @ np.linalg.solve(covariance, off) + np.linalg.slogdet(covariance)[1])
+    def deviances(
+        self, scaled: str, factors: Sequence[float] | Array, within: SensorTolerances
+    ) -> Array:
+        """Return minus twice the logarithm of the likelihood of factors, but for a constant."""
+        off, covariance = self._explained(scaled, factors, within)
+        return np.asarray(_squared(off, covariance) + np.linalg.slogdet(covariance)[1])
 
     def _explained(
-        self, scaled: str, factor: float, within: SensorTolerances
+        self, scaled: str, factors: Sequence[float] | Array, within: SensorTolerances
     ) -> tuple[Array, Array]:
-        """Return what surfaces explain of the identity, (instruments,), and its covariance."""
+        """Return what surfaces explain of the identity, (factors, instruments), and its covariance.
+
+        One stacked factorisation for all factors: a table with a wrong unit asks for 100 000.
+        """
         left = self.rate
         for part in self.parts.values():
             left = left.plus(-1.0, part)
-        if scaled:
-            left = left.plus(1.0 - factor, (self.parts | self.terms)[scaled])
-        beta, *_ = np.linalg.lstsq(left.rest[:, 1:], left.rest[:, 0], rcond=None)
-        weights = np.concatenate([[1.0], -beta])
-        free = len(self._own) - len(beta) - self._own.shape[1] - self.instruments
-        variance = float(np.sum((left.rest @ weights) ** 2)) / free
-        variance += within.unknown**2 * float(np.mean((self.rate.along @ weights) ** 2))
-        covariance = variance * np.eye(len(left.along))
+        more = (1.0 - np.asarray(factors))[:, None, None]
+        added = (self.parts | self.terms)[scaled] if scaled else left
+        along = left.along + more * added.along
+        weights, squares = _whitening(left.rest + more * added.rest)
+        free = len(self._own) - PAST_STEPS - self._own.shape[1] - self.instruments
+        variance = squares / free
+        variance += within.unknown**2 * np.mean((weights @ self.rate.along.T) ** 2, axis=1)
         signals = self.parts | {"": self.rate}
         errors = [share * signals[name].along for name, share in within.shares.items()]
         errors += [*self._errors, *(within.delays * one for one in self._delayed)]
-        for along in errors:
-            error = along @ weights
-            covariance += np.outer(error, error)
-        return left.along @ weights, covariance
+        error = weights @ np.stack(errors).transpose(0, 2, 1)  # (errors, factors, instruments)
+        covariance = np.einsum("efi,efj->fij", error, error)
+        covariance += variance[:, None, None] * np.eye(self.instruments)
+        return (along @ weights[:, :, None])[:, :, 0], covariance
 
     def _together(self, signals: Sequence[Array]) -> list[_Seen]:
         """Return signals and their pasts, all else of them in one basis of their own."""
@@ -172,8 +179,8 @@ def driven_factors(law: Identity) -> Iterator[DrivenFactor]:
         return
     found = []
     for name in (*law.parts, *law.terms):
-        broken = {f: test.misfit(name, f) for f in (-1.0, *TRIED)}
-        right = min(test.misfit(name, f) for f in RIGHT)
+        broken = _by_factor([(test, name)], (-1.0, *TRIED))
+        right = float(np.min(test.misfits(name, RIGHT)))
         slope = min(broken, key=broken.__getitem__)
         least = min(least, broken[slope], right)
         if right - broken[slope] > CERTAIN:
@@ -195,7 +202,7 @@ def shared_factor(shares: Sequence[tuple[Identity, str]], tried: Iterable[float]
     whole = sum(test.misfit() for test, _ in tests)
     if whole < CERTAIN:
         return None
-    broken = {f: sum(test.misfit(name, f) for test, name in tests) for f in tried}
+    broken = _by_factor(tests, tuple(tried))
     slope = min(broken, key=broken.__getitem__)
     return slope if whole - broken[slope] > CERTAIN else None
 
@@ -220,12 +227,19 @@ def likelier_factor(
     if not tests:
         return None
     broken = {
-        f: sum(test.misfit(name, f) for test, name in tests) + unlikely.get(f, 0.0)
-        for f in (1.0, *tried)
+        f: value + unlikely.get(f, 0.0) for f, value in _by_factor(tests, (1.0, *tried)).items()
     }
     slope = min(broken, key=broken.__getitem__)
     least = LIKELIER * (2.0 if unlikely else 1.0)  # what is usual is a second measure
     return slope if broken[1.0] - broken[slope] > least else None
+
+
+def _by_factor(
+    tests: Sequence[tuple[DrivenTest, str]], factors: Sequence[float]
+) -> dict[float, float]:
+    """Return how far each factor of a part of each identity leaves them broken."""
+    broken = sum(test.misfits(name, factors) for test, name in tests)
+    return dict(zip(factors, np.atleast_1d(broken).tolist(), strict=True))
 
 
 def testable(law: Identity) -> bool:
@@ -233,6 +247,40 @@ def testable(law: Identity) -> bool:
     count = PAST_STEPS + 1 + len(law.beside) + len(law.inputs) * len(LAGS_STEPS)
     long = law.step_s * len(law.rate) >= SHORTEST_S
     return long and len(law.inputs) > 0 and len(law.rate) - PAST_STEPS >= ROWS_EACH * count
+
+
+def _whitening(signals: Array) -> tuple[Array, Array]:
+    """Return weights of signals and their pasts that leave the least, and how much that is.
+
+    Parameters
+    ----------
+    signals : Array, shape (factors, rows, past + 1)
+        The present first.
+
+    Returns
+    -------
+    Array, shape (factors, past + 1)
+        One, and minus what the past tells of the present.
+    Array, shape (factors,)
+        Sum of squares that is left.
+    """
+    triangle: Array = np.asarray(np.linalg.qr(np.roll(signals, -1, axis=2), mode="r"))
+    past, present = triangle[:, :-1, :-1], triangle[:, :-1, -1:]
+    size = np.abs(np.diagonal(past, axis1=1, axis2=2))
+    if np.all(size.min(axis=1) > REPEATS * size.max(axis=1)):
+        beta = np.linalg.solve(past, present)[:, :, 0]
+    else:
+        least = np.finfo(float).eps * signals.shape[1]
+        beta = (np.linalg.pinv(past, rcond=least) @ present)[:, :, 0]
+    left = present[:, :, 0] - (past @ beta[:, :, None])[:, :, 0]
+    squares = np.sum(left**2, axis=1) + triangle[:, -1, -1] ** 2
+    return np.concatenate([np.ones((len(beta), 1)), -beta], axis=1), squares
+
+
+def _squared(off: Array, covariance: Array) -> Array:
+    """Return how many deviations squared values are from none, (factors,)."""
+    solved = np.linalg.solve(covariance, off[:, :, None])[:, :, 0]
+    return np.asarray(np.sum(off * solved, axis=1))
 
 
 def _lagged(values: Array, steps: float) -> Array:
