@@ -127,8 +127,9 @@ def test_a_model_of_lift_and_pitch(
     agrees(part, whole, LIFT_AND_PITCH)
 
 
-def with_thrust(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the table with thrust and shaft power as gauges would have them, without throttle."""
+@pytest.fixture(scope="module")
+def gauged(table: pd.DataFrame) -> pd.DataFrame:
+    """The table with thrust and shaft power as gauges would have them, without throttle."""
     plant, frame = powerplant(NAME), load_measured(NAME).airframe()
     speed, density = (table[c].to_numpy() for c in ("airspeed_mps", "density_kgpm3"))
     dt_s = float(table["t_s"][1] - table["t_s"][0])
@@ -140,15 +141,13 @@ def with_thrust(table: pd.DataFrame) -> pd.DataFrame:
 
 @pytest.mark.parametrize("gauge", ["thrust_n", "power_w"])
 def test_thrust_may_be_measured(
-    table: pd.DataFrame, whole: host.Identification, gauge: str
+    gauged: pd.DataFrame, whole: host.Identification, gauge: str
 ) -> None:
-    gauged = with_thrust(table)
     part = identified(gauged.drop(columns=[g for g in ("thrust_n", "power_w") if g != gauge]))
     agrees(part, whole, (*LIFT_AND_PITCH, "CD_0", "CD_alpha"))
 
 
-def test_measured_thrust_is_believed(table: pd.DataFrame, whole: host.Identification) -> None:
-    gauged = with_thrust(table)
+def test_measured_thrust_is_believed(gauged: pd.DataFrame, whole: host.Identification) -> None:
     wrong = identified(gauged.drop(columns=["power_w"]).assign(thrust_n=1.5 * gauged["thrust_n"]))
     drag = [
         next(d.value for d in one.coefficients.fit.derivatives if d.name == "CD_0")  # type: ignore
@@ -158,10 +157,10 @@ def test_measured_thrust_is_believed(table: pd.DataFrame, whole: host.Identifica
 
 
 def test_measured_thrust_comes_through_a_map(
-    table: pd.DataFrame, whole: host.Identification, tmp_path: Path
+    gauged: pd.DataFrame, whole: host.Identification, tmp_path: Path
 ) -> None:
     source, mapping = tmp_path / "t.csv", tmp_path / "map.toml"
-    gauged = with_thrust(table).drop(columns=["power_w"])
+    gauged = gauged.drop(columns=["power_w"])
     gauged["Thrust lbf"] = gauged.pop("thrust_n") / 4.448222
     gauged.to_csv(source, index=False)
     named = "".join(f'{c} = "{c}"\n' for c in gauged.columns if " " not in c)
