@@ -110,7 +110,11 @@ def runs(values: Array) -> tuple[IntArray, IntArray]:
 def _hold(starts: IntArray) -> tuple[int, int]:
     """Return after how many rows values may change, and the first such row; 1 if after any."""
     most = min(LONGEST_HOLD, int(starts[-1] - starts[0]) // FEWEST)
+    apart = np.bincount(np.diff(starts))
     for hold in range(most, 1, -1):
+        # Where so many begin at rows of one hold, all but twice the rest are whole holds apart.
+        if apart[::hold].sum() < len(starts) - 1 - 2.0 * (1.0 - AT_ROWS) * len(starts):
+            continue
         count = np.bincount(starts % hold, minlength=hold)
         if count.max() >= AT_ROWS * len(starts):
             return hold, int(np.argmax(count))

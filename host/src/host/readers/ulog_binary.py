@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from host.progress import progress_bar
@@ -198,7 +199,8 @@ class _Reading:
         head = file.read(_MESSAGE_HEAD + _BEHIND)
         if len(head) < _MESSAGE_HEAD:
             return True
-        can_be = self._heads(np.frombuffer(head + bytes(_BEHIND), np.uint8), 1, _LONGEST)[0]
+        view = np.frombuffer(head + bytes(_BEHIND), np.uint8)
+        can_be = self._every_head(view, 1, _LONGEST)[0]
         return bool(can_be) and at + _MESSAGE_HEAD + (head[0] | head[1] << 8) > end
 
     def _portion(
@@ -217,7 +219,11 @@ class _Reading:
         """
         view = np.frombuffer(data + bytes(_BEHIND), dtype=np.uint8)
         count = min(most, end - first - _MESSAGE_HEAD + 1)
-        can_be = self._heads(view, count, end - first).tobytes()
+        chain, at, subscribed = self._chain(data, view, count)
+        if self._heads(view, chain, end - first).all():
+            self._take(data, view, chain)
+            return at, subscribed, []
+        can_be = self._every_head(view, count, end - first).tobytes()
         starts: list[int] = []
         strange: list[tuple[int, int]] = []
         at, subscribed = 0, False
@@ -237,19 +243,43 @@ class _Reading:
         self._take(data, view, np.array(starts, dtype=np.int64))
         return at, subscribed, strange
 
+    def _chain(
+        self, data: bytes, view: NDArray[np.uint8], count: int
+    ) -> tuple[NDArray[np.int64], int, bool]:
+        """Return where messages begin if each is one, where the last ends, and whether that is a
+        new subscription: what follows is judged by it."""
+        places: list[int] = []
+        at = 0
+        while at < count:
+            places.append(at)
+            at += _MESSAGE_HEAD + (data[at] | data[at + 1] << 8)
+        chain = np.array(places, dtype=np.int64)
+        for k in np.flatnonzero(view[chain + 2] == _SUBSCRIPTION).tolist():
+            if self._is_new(data, places[k]):
+                return chain[: k + 1], (*places, at)[k + 1], True
+        return chain, at, False
+
     def _is_new(self, data: bytes, at: int) -> bool:
         """Return whether the subscription there is the first of its number, and is taken."""
         number = data[at + 4] | data[at + 5] << 8
         return self._subscribed < MOST_SUBSCRIPTIONS and not self._most[number]
 
-    def _heads(self, view: NDArray[np.uint8], count: int, end: int) -> NDArray[np.bool_]:
+    def _every_head(self, view: NDArray[np.uint8], count: int, end: int) -> NDArray[np.bool_]:
         """Return of the first so many places whether a message can begin there and ends before
         `end`."""
         can_be = np.zeros(count, dtype=bool)
         at = np.flatnonzero(KINDS[view[2 : count + 2]])
-        length = view[at].astype(np.int64) | view[at + 1].astype(np.int64) << 8
-        inside = (length > 0) & (at + _MESSAGE_HEAD + length <= end)
-        at, length = at[inside], length[inside]
+        can_be[at] = self._heads(view, at, end)
+        return can_be
+
+    def _heads(
+        self, view: NDArray[np.uint8], places: NDArray[np.int64], end: int
+    ) -> NDArray[np.bool_]:
+        """Return of some places whether a message can begin there and ends before `end`."""
+        can_be = np.zeros(len(places), dtype=bool)
+        length = view[places].astype(np.int64) | view[places + 1].astype(np.int64) << 8
+        inside = (length > 0) & (places + _MESSAGE_HEAD + length <= end)
+        at, length = places[inside], length[inside]
         kind = view[at + 2]
         first, second, third, fourth = (view[at + _MESSAGE_HEAD + k] for k in range(4))
         number = first.astype(np.int64) | second.astype(np.int64) << 8
@@ -271,7 +301,7 @@ class _Reading:
         for kinds, rule in rules.items():
             for one in kinds.encode():
                 right |= (kind == one) & rule
-        can_be[at[right]] = True
+        can_be[inside] = right
         return can_be
 
     def _take(self, data: bytes, view: NDArray[np.uint8], starts: NDArray[np.int64]) -> None:
@@ -285,7 +315,8 @@ class _Reading:
         turns = np.flatnonzero(np.diff(which[order])) + 1
         for group in np.split(order, turns) if len(order) else ():
             topic = self.found.topics[which[group[0]]]
-            body = view[rows[group, None] + (_MESSAGE_HEAD + 2) + topic.span]
+            whole = sliding_window_view(view, int(topic.span.max()) + 1)
+            body = whole[rows[group] + _MESSAGE_HEAD + 2][:, topic.span]
             topic.data += body.tobytes()
         for at in starts[np.isin(kinds, np.frombuffer(b"FIPALO", "u1"))].tolist():
             length = data[at] | data[at + 1] << 8

@@ -98,9 +98,27 @@ def _reckoned(rates: Array, force: Array, dt_s: float) -> Array:
     push = 0.5 * dt_s * (force[:-1] + force[1:])
     back = np.linalg.inv(np.eye(3) - turn)
     turns, pushes = back @ (np.eye(3) + turn), np.einsum("kij,kj->ki", back, push)
-    result = np.zeros((len(rates), 3, 4))
-    result[0, :, :3] = np.eye(3)
-    for k, (turned, pushed) in enumerate(zip(turns, pushes, strict=True)):
-        result[k + 1] = turned @ result[k]
-        result[k + 1, :, 3] += pushed
-    return result
+    steps = np.tile(np.eye(4), (len(turns), 1, 1))
+    steps[:, :3, :3], steps[:, :3, 3] = turns, pushes
+    return _products_before(steps)[:, :3]
+
+
+def _products_before(steps: Array) -> Array:
+    """Return the product of all steps before each, the last of them first, (n + 1, 4, 4).
+
+    Pieces of the record side by side, then each behind the product of all pieces before it: a loop
+    over samples is slow in an interpreter.
+    """
+    count = len(steps)
+    length = max(1, round(count**0.5))
+    pieces = -(-count // length)
+    parts = np.tile(np.eye(4), (pieces * length, 1, 1))
+    parts[:count] = steps
+    parts = parts.reshape(pieces, length, 4, 4)
+    for k in range(1, length):
+        parts[:, k] = parts[:, k] @ parts[:, k - 1]
+    before = np.eye(4)
+    for part in parts:
+        part[...] = part @ before
+        before = part[-1]
+    return np.concatenate([np.eye(4)[None], parts.reshape(-1, 4, 4)[:count]])

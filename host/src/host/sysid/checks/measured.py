@@ -57,9 +57,8 @@ def measured(
     raw, notes = dict(columns), []
     sensors = [name for name in names if name in columns]
     for name in sensors:
-        values = raw[name].copy()
-        notes += [f"{name}: {note}" for note in _spikes(t, values)]
-        raw[name] = values
+        raw[name], said = _without_spikes(t, raw[name])
+        notes += [f"{name}: {note}" for note in said]
     sampling = {name: sampling_of(raw[name]) for name in sensors}
     held = {name: s.hold for name, s in sampling.items() if s.hold > 1}
     if held:
@@ -83,12 +82,13 @@ def _without_stuck(
     look = {k: raw[k][flying] for k in ("t_s", *sensors)}
     for name in sensors:
         own = sampling[name]
-        values = np.where(own.sampled, raw[name], np.nan)
+        values = raw[name] if own.sampled.all() else np.where(own.sampled, raw[name], np.nan)
         still_s = max(longest_s, LONGEST_HOLDS * own.hold * usual_s)
         stuck = stuck_runs(look, name, own.step, still_s)
         if stuck:
             found = _stuck_finding(look, name, stuck).accepted_if(accept)
             findings.append(found)
+            values = values.copy()
             for first, end in () if found.accepted else stuck:
                 values[flying.start + first : flying.start + end] = np.nan
         result[name] = values
@@ -104,20 +104,22 @@ def _airborne(columns: Mapping[str, Array], rows: int) -> slice:
     return slice(int(flown[0]), int(flown[-1]) + 1) if len(flown) else slice(0, rows)
 
 
-def _spikes(t: Array, values: Array) -> list[str]:
+def _without_spikes(t: Array, values: Array) -> tuple[Array, list[str]]:
+    """Return a column, what is far out of it missing, and a note on that."""
     seen = np.isfinite(values)
     if seen.sum() < FEWEST:
-        return []
+        return values, []
     low, middle, high = np.quantile(values[seen], (0.02, 0.5, 0.98))
     far = np.flatnonzero(seen & (np.abs(values - middle) > SPIKE_RANGES * (high - low)))
     if not 0 < len(far) < SPIKE_SHARE * seen.sum() or high <= low:
-        return []
+        return values, []
     note = (
         f"{len(far)} value{'s' if len(far) > 1 else ''} far out of all others count as missing"
         f" (the first is {values[far[0]]:.4g} at {t[far[0]]:.6g} s)"
     )
-    values[far] = np.nan
-    return [note]
+    kept = values.copy()
+    kept[far] = np.nan
+    return kept, [note]
 
 
 def _stuck_finding(

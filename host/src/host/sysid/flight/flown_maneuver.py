@@ -49,10 +49,10 @@ class FlownManeuver:
     def _inside(self, columns: Mapping[str, Array]) -> dict[str, Array]:
         t = self.flight.corrected["t_s"]
         first, last = self.found.fit_window()
-        at = np.flatnonzero((t >= first) & (t <= last))
-        at = at[: len(at) // self.block * self.block]
+        begin, end = np.searchsorted(t, first), np.searchsorted(t, last, side="right")
+        at = slice(begin, begin + (end - begin) // self.block * self.block)
         cut = {
-            name: values[at].reshape(-1, self.block).mean(axis=1) if self.block > 1 else values[at]
+            name: values[at].reshape(-1, self.block).mean(axis=1)
             for name, values in columns.items()
         }
         moving = [f"{name}_rad" for name in SURFACES if self.surfaces_move]

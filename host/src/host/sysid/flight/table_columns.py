@@ -82,7 +82,9 @@ def _timed(
 def _measured(columns: dict[str, Array], notes: list[str], accept: Collection[str]) -> Measured:
     """Return the rows that are used, in order, what was not measured as missing, and findings."""
     index = rows_in_order(columns["t_s"], notes)
-    found = measured({k: v[index] for k, v in columns.items()}, SENSORS, LONGEST_GAP_S, accept)
+    if len(index) < len(columns["t_s"]) or np.any(np.diff(index) != 1):
+        columns = {k: v[index] for k, v in columns.items()}
+    found = measured(columns, SENSORS, LONGEST_GAP_S, accept)
     notes += found.notes
     return found
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from host.arrays import Array
@@ -45,7 +45,7 @@ def servo_of(chosen: ChosenModel, departures: Sequence[Array]) -> tuple[ServoEst
     prior, plain = flights[0].servo, _without_places(chosen.model)
 
     def behind(values: tuple[float, float, float]) -> list[Maneuver]:
-        moved = brought_behind(chosen.used, values)
+        moved = brought_behind(chosen.used, values, commanded)
         return remove_departures([m.cut(plain) for m in moved], departures)
 
     coarse = CoarseDelays(plain, behind, prior, _white)
@@ -101,13 +101,23 @@ def _with_gust(airspeed_mps: float) -> Fit:
 
 
 def brought_behind(
-    used: Sequence[FlownManeuver], servo: tuple[float, float, float]
+    used: Sequence[FlownManeuver],
+    servo: tuple[float, float, float],
+    surfaces: Collection[str] | None = None,
 ) -> list[FlownManeuver]:
-    """Return maneuvers with commanded surfaces where servos of these numbers had brought them."""
+    """Return maneuvers with commanded surfaces where servos of these numbers had brought them.
+
+    With `surfaces` only these: a search moves those of its model alone.
+    """
     own: dict[int, ReconstructedFlight] = {}
     for m in used:
         f = m.flight
         if id(f) not in own:
-            at = behind_servos(f.commands, f.corrected["t_s"], servo) if f.commands else {}
+            own_commands = {
+                name: values
+                for name, values in f.commands.items()
+                if surfaces is None or name in surfaces
+            }
+            at = behind_servos(own_commands, f.corrected["t_s"], servo) if own_commands else {}
             own[id(f)] = replace(f, corrected={**f.corrected, **at}) if at else f
     return [replace(m, flight=own[id(m.flight)]) for m in used]

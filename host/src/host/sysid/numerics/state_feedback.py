@@ -16,6 +16,7 @@ taken out of the products of the signals (Fuller, Measurement Error Models, 1987
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -190,6 +191,13 @@ class _Record:
         if len(noise):
             self.power = (self.rows.size - self.sizes.size) * np.square(noise)
 
+    def of_signals(self, signals: Sequence[int]) -> _Record:
+        """Return the same with some of the signals alone."""
+        fewer = copy(self)
+        fewer.values, fewer._behind = self.values[:, list(signals)], {}
+        fewer.power = self.power[[0, *(1 + k for k in signals)]]
+        return fewer
+
     def _centred(self, values: Array) -> Array:
         """Return values (delays, rows, columns) without the mean of each window."""
         if not values.size:
@@ -332,6 +340,7 @@ def _refined(record: _Record, found: _Found, names: Sequence[str]) -> FeedbackLa
     """Return the law with delay and time constants between those of the grid."""
     from scipy import optimize  # where no input follows anything, nothing else loads it (0.25 s)
 
+    record = record.of_signals(found.signals)
     lag_s, washout_s = found.shape
     lagged, washed = lag_s > 0.0, washout_s < np.inf
     shape = [np.log(x) for x, there in ((lag_s, lagged), (washout_s, washed)) if there]
@@ -346,7 +355,7 @@ def _refined(record: _Record, found: _Found, names: Sequence[str]) -> FeedbackLa
         return record.products((lag, wash), np.array([delay]))
 
     def fit(p: Array) -> _Fit:
-        return _fits(*gram(p), found.signals)[int(found.cleaned)]
+        return _fits(*gram(p), range(len(found.signals)))[int(found.cleaned)]
 
     def left(p: Array) -> float:
         [r2], [explained], _ = fit(p)
@@ -361,9 +370,8 @@ def _refined(record: _Record, found: _Found, names: Sequence[str]) -> FeedbackLa
     )
     # Time constants that let the signals be mostly noise explain more than there is.
     x = start if fit(start).r2[0] > fit(best.x).r2[0] + WORSE else best.x
-    at = [1 + k for k in found.signals]
     [r2], _, [gains] = fit(x)
-    order = np.argsort(-np.abs(gains) * np.sqrt(np.diag(gram(x)[0][0])[at]))
+    order = np.argsort(-np.abs(gains) * np.sqrt(np.diag(gram(x)[0][0])[1:]))
     return FeedbackLaw(
         tuple(names[found.signals[k]] for k in order),
         tuple(float(gains[k]) for k in order),
