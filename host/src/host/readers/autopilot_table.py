@@ -7,7 +7,9 @@ from pathlib import Path
 
 from host.physical.recording import AUTOPILOT, SURFACES, Recording
 from host.readers.autopilot_flight import CLOCK_SHARE, read_autopilot
+from host.readers.autotune_model import tuned_models
 from host.readers.foreign_tables import Foreign
+from host.readers.px4_channels import torque_setpoints
 
 
 def autopilot_table(
@@ -36,4 +38,5 @@ def autopilot_table(
         recording=Recording(commanded, CLOCK_SHARE, AUTOPILOT, read.imu_lag_s),
         shares=shares,
         slow_outputs=read.undersampled(),
+        tuned=tuned_models(read.log, read.channels.signals, torque_setpoints(read.log)),
     )

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from host.log.flown_inputs import FlownInput
+    from host.readers.autotune_model import TunedModel
 
 TEXT_KINDS = (".csv", ".tsv", ".txt", ".dat")
 MOST_UNIT_ROWS = 2
@@ -35,7 +36,7 @@ class Foreign:
     `twice` are names that several columns have; `recording` is what the source shows of itself,
     `calibration` what made the columns of a log; of an autopilot's log `shares` are the surfaces in
     shares of full travel, `slow_outputs` those whose output was logged more slowly than servos get
-    it, Hz; `inputs` are those that our logger flew itself.
+    it, Hz, `tuned` what its autotune identified; `inputs` are those that our logger flew itself.
     """
 
     columns: dict[str, Array] = field(default_factory=dict)
@@ -48,6 +49,7 @@ class Foreign:
     shares: tuple[str, ...] = ()
     slow_outputs: dict[str, float] = field(default_factory=dict)
     inputs: Sequence[FlownInput] = ()
+    tuned: tuple[TunedModel, ...] = ()
 
 
 def read_foreign(source: Path) -> Foreign:

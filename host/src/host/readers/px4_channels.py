@@ -321,7 +321,22 @@ def _rows(outputs: Mapping[int, Array], rows: slice) -> dict[int, Array]:
 
 
 def _axes(log: AutopilotLog, _chosen: Mapping[str, int]) -> tuple[Messages, Outputs] | None:
-    """Return the demand of roll, pitch and yaw: of a VTOL that of its wing."""
+    """Return the surfaces as the demand of roll, pitch and yaw has them."""
+    asked = _axis_demand(log)
+    return None if asked is None else (asked[0], axis_demands(*asked[1:]))
+
+
+def torque_setpoints(log: AutopilotLog) -> dict[str, Signal]:
+    """Return the normalised torque setpoint about the axis of each body rate."""
+    asked = _axis_demand(log)
+    if asked is None:
+        return {}
+    messages, values, topic = asked
+    return {n: Signal(messages.t_s, v, topic) for n, v in zip(RATES, values, strict=True)}
+
+
+def _axis_demand(log: AutopilotLog) -> tuple[Messages, list[Array], str] | None:
+    """Return the demand of roll, pitch and yaw and its topic: of a VTOL that of its wing."""
     topics = (("vehicle_torque_setpoint", "xyz"), ("actuator_controls_1", "control"),
               ("actuator_controls_0", "control"))  # fmt: skip
     for topic, field in topics:
@@ -335,7 +350,7 @@ def _axes(log: AutopilotLog, _chosen: Mapping[str, int]) -> tuple[Messages, Outp
         hover = topic == "vehicle_torque_setpoint"  # what the mixer's groups hold is the wing's own
         values = _body_vector(log, messages, field) if hover else _vector(messages, field)
         if values is not None:
-            return messages, axis_demands(values, topic)
+            return messages, values, topic
     return None
 
 

@@ -165,7 +165,7 @@ def _verdict_box(found: Identification, numbers: JsonNumbers) -> str:
     if all(row[-1].endswith(">none</span>") for row in rows):
         heads, rows = heads[:-1], [row[:-1] for row in rows]
     short = "\n".join(map(escaped, found.summary_lines()))
-    lines = "\n".join(map(escaped, found.verdict))
+    lines = "\n".join(map(escaped, (*found.verdict, *found.opinion_lines)))
     return (
         f'<div class="verdict"><h2>Verdict</h2><pre>{short}</pre>{table(heads, rows, range(5))}'
         f"<details><summary>every reason</summary><pre>{lines}</pre></details></div>"

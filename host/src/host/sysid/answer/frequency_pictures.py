@@ -26,19 +26,24 @@ from host.sysid.maneuvers.maneuver_selection import SURFACES
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from host.sysid.answer.autotune_opinion import Opinion
+
 OUTPUTS = ("p_radps", "q_radps", "r_radps", "az_mps2")  # that a picture has
-RECORD, FAINT, BAND = "0.25", "0.75", "#dbeafe"
+RECORD, FAINT, BAND, TUNED = "0.25", "0.75", "#dbeafe", "C2"
 ACROSS = 4  # pairs side by side
 TICKS_HZ = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 ABOUT = (
     f"dots: the record, dark where its coherence is above {COHERENT:g}; red: the model with its"
-    " 95 % interval; shaded: the band where coherence holds"
+    " 95 % interval; green dashes: an autotune; shaded: the band where coherence holds"
 )
 DECIBEL = 20.0 / np.log(10.0)
+Curve = tuple[Array, NDArray[np.complexfloating]]
 
 
 def frequency_pictures(
-    answers: Sequence[Answer], findings: Sequence[Finding] = ()
+    answers: Sequence[Answer],
+    findings: Sequence[Finding] = (),
+    opinions: Sequence[Sequence[Opinion]] = (),
 ) -> tuple[list[Figure], list[str]]:
     """Return one picture of answers' frequency responses, none if no record tells one; and lines.
 
@@ -48,6 +53,8 @@ def frequency_pictures(
         Linear models.
     findings : sequence of Finding
         Those of feedback say which responses lean towards the controller's inverse.
+    opinions : sequence of sequence of Opinion
+        What autotunes say beside each answer, drawn over it.
 
     Raises
     ------
@@ -56,23 +63,37 @@ def frequency_pictures(
     """
     pairs: list[Pair] = []
     titles, lines = [], []
-    for answer in answers:
+    for number, answer in enumerate(answers):
+        beside = opinions[number] if opinions else ()
         try:
             own, method = pairs_of(answer)
         except IdentificationError as error:
             lines.append(f"{answer.template}: no frequency response: {error}")
             continue
-        pairs += own
+        pairs += [replace(pair, opinions=opinions_of(pair, beside)) for pair in own]
         titles.append(f"{answer.template}, {answer.method}: {method}")
         warned = feedback_lines(answer.model.inputs, findings)
         titles += warned
         lines += [titles[-1 - len(warned)], *(f"  {line}" for line in (*band_lines(own), *warned))]
+        lines += [f"  {one.line}" for one in beside]
     return ([frequency_figure(pairs, "\n".join(titles))] if pairs else []), lines
+
+
+def opinions_of(pair: Pair, opinions: Sequence[Opinion]) -> tuple[Curve, ...]:
+    """Return what autotunes say of a pair, over its surface."""
+    return tuple(
+        (one.frequency_hz, one.theirs / one.surface_per_torque)
+        for one in opinions
+        if (one.tuned.rate, one.input) == (pair.output, pair.input)
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """One output over one input, (f,) each; `half_width` as `ModelResponse` has it."""
+    """One output over one input, (f,) each; `half_width` as `ModelResponse` has it.
+
+    `opinions` are those of autotunes: frequencies, and the response to the surface.
+    """
 
     output: str
     input: str
@@ -81,6 +102,7 @@ class Pair:
     coherence: Array
     model: NDArray[np.complexfloating]
     half_width: NDArray[np.complexfloating]
+    opinions: tuple[Curve, ...] = ()
 
     @property
     def band_hz(self) -> tuple[float, float] | None:
@@ -175,7 +197,8 @@ def frequency_figure(pairs: Sequence[Pair], title: str) -> Figure:
 def _as_shown(pair: Pair) -> Pair:
     """Return a pair without what is two octaves beyond its band: noise alone."""
     end = int(np.searchsorted(pair.frequency_hz, 4.0 * pair.band_hz[1])) if pair.band_hz else None
-    cut = {f.name: getattr(pair, f.name)[:end] for f in fields(pair) if f.type != "str"}
+    whole = ("output", "input", "opinions")
+    cut = {f.name: getattr(pair, f.name)[:end] for f in fields(pair) if f.name not in whole}
     return replace(pair, **cut)
 
 
@@ -184,6 +207,12 @@ def _draw(axes: Any, pair: Pair, *, first: bool) -> None:
     coherent, band = pair.coherence > COHERENT, pair.band_hz
     phase = np.unwrap(np.angle(pair.model))
     beside = phase + np.angle(pair.recorded / pair.model)  # the turn that is nearest to the model
+    for their_hz, theirs in pair.opinions:
+        own = np.interp(their_hz, f, phase)
+        turn = own + np.angle(theirs * np.exp(-1j * own))  # that is nearest to the model
+        size = DECIBEL * np.log(np.abs(scale * theirs))
+        for axis, values in ((axes[0], size), (axes[1], np.degrees(turn))):
+            axis.plot(their_hz, values, color=TUNED, lw=1.0, ls="--")
     for axis, dots, line, half in (
         (axes[0], DECIBEL * np.log(np.maximum(np.abs(scale * pair.recorded), 1e-300)),
          DECIBEL * np.log(np.abs(scale * pair.model)), DECIBEL * pair.half_width.real),

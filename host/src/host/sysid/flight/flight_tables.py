@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from host.log import FlightLog
+    from host.readers.autotune_model import TunedModel
 
 SENSORS = tuple(name for name in FITTED if name not in SURFACES)  # a command may well stand still
 READ = (*TEXT_KINDS, ".parquet", ".mat")
@@ -51,7 +52,8 @@ class FlightColumns:
     """Columns of a flight in SI on an even grid, and what is known of them.
 
     Notes say what was done to them, findings what checks found. `resolution` is the step of the
-    numbers of each quantised one; of a log there is the calibration that made them.
+    numbers of each quantised one; of a log there is the calibration that made them. `tuned` is what
+    an autopilot's autotune identified.
     """
 
     columns: dict[str, Array]
@@ -61,6 +63,7 @@ class FlightColumns:
     findings: list[Finding] = field(default_factory=list)
     resolution: dict[str, float] = field(default_factory=dict)
     shares: tuple[str, ...] = ()
+    tuned: tuple[TunedModel, ...] = ()
 
 
 def read_columns(
@@ -157,6 +160,7 @@ def read_flight_columns(
         findings,
         resolution,
         tuple(s for s in found.shares if f"{s}_rad" not in lines),
+        found.tuned,
     )
 
 

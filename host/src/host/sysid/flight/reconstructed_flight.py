@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from host.instrument.deviations import SensorErrorModel
     from host.instrument.instrument_errors import InstrumentErrors
     from host.instrument.servo_prior import ServoPrior
+    from host.readers.autotune_model import TunedModel
     from host.sysid.checks.data_finding import Finding
     from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
     from host.sysid.reconstruction.flow_angles import FlowAngles
@@ -73,6 +74,8 @@ class ReconstructedFlight:
         Of sensors that came to no agreement: all that their calibration leaves open.
     record : tuple of ColumnChange
         What was done to `corrected`, and why.
+    tuned : tuple of TunedModel
+        What the autopilot's autotune identified in it.
     """
 
     source: str
@@ -91,6 +94,7 @@ class ReconstructedFlight:
     errors: InstrumentErrors | None = None
     calibration_alone: Compatibility | None = None
     record: Record = ()
+    tuned: tuple[TunedModel, ...] = ()
 
     @property
     def least_noise(self) -> dict[str, float]:

@@ -119,6 +119,7 @@ def prepare(given: FlightAtHand) -> PreparedFlight:
         angles=angles,
         errors=sensors.errors,
         calibration_alone=agreed.by_calibration,
+        tuned=read.tuned,
         record=(
             *change_of(read.columns, in_rad, "shares of travel made angles", "the aircraft file"),
             *change_of(in_rad, columns, "commands brought behind usual servos", "no pot is there"),

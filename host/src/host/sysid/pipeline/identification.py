@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from host.aircraft.prior.prior_table import PriorTable
     from host.sysid.aerodynamics.coefficient_table import CoefficientTable
+    from host.sysid.answer.autotune_opinion import Opinion
     from host.sysid.answer.marks import Verdict
     from host.sysid.answer.output_files import OutputPaths
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
@@ -123,6 +124,12 @@ class Identification:
         direct = self.coefficients
         return list(direct.tables) if direct else [a.table for a in self.linear]
 
+    @property
+    def opinion_lines(self) -> list[str]:
+        """What autotunes say, in words."""
+        both = zip(self.linear, self.opinions, strict=False)
+        return [f"{answer.template}: {one.line}" for answer, every in both for one in every]
+
     def plot(self) -> Pictures:
         """Return all pictures: time histories, poles, intervals, spectra of the inputs.
 
@@ -150,7 +157,16 @@ class Identification:
         """
         from host.sysid.answer.frequency_pictures import frequency_pictures
 
-        return frequency_pictures(self.linear, self.findings)
+        return frequency_pictures(self.linear, self.findings, self.opinions)
+
+    @cached_property
+    def opinions(self) -> tuple[tuple[Opinion, ...], ...]:
+        """What autotunes in the logs say beside each linear answer."""
+        if not any(flight.tuned for flight in self.flights):
+            return ()
+        from host.sysid.answer.autotune_opinion import opinions
+
+        return tuple(opinions(answer, self.flights) for answer in self.linear)
 
     def simulate(
         self,
@@ -227,9 +243,11 @@ class Identification:
             pitots = pitot_lines(self.flights, self.agreements)
         if full:
             known, advice = known_line(self.summary), advice_lines(self.summary)
-            lines = [known, *self.verdict, *pitots, *advice, *self._numbers(width)]
+            said = [*pitots, *self.opinion_lines]
+            lines = [known, *self.verdict, *said, *advice, *self._numbers(width)]
         else:
-            lines = [*self.summary_lines(width), *pitots]
+            said = [*pitots, *(one.short for every in self.opinions for one in every)]
+            lines = [*self.summary_lines(width), *said]
         if self.prior is not None or self.truth is not None:
             from host.sysid.pipeline.whole_answer import compared_lines
 
