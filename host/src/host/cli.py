@@ -121,10 +121,16 @@ def _interrupted() -> int:
     return int(ExitCode.INTERRUPTED)
 
 
+def _line_of(error: HostError) -> str:
+    """Return an error's line; a file that was made of a gzip has the gzip's name in it."""
+    packed = sys.modules.get("host.readers.gzip_file")  # not loaded: nothing was made
+    return str(error) if packed is None else str(packed.as_given(str(error)))
+
+
 def _failed(arguments: list[str], error: Exception) -> int:
     """Say in one line what went wrong; return the exit code."""
     if isinstance(error, HostError):
-        return _end(arguments, str(error), error.exit_code)
+        return _end(arguments, _line_of(error), error.exit_code)
     if isinstance(error, BrokenPipeError):
         # The reader (`head`, a pager) left: nothing more to say, and nothing to flush at exit.
         _nothing_more(sys.stdout)

@@ -108,6 +108,18 @@ def test_a_packed_table_is_read(tmp_path: Path) -> None:
         np.testing.assert_array_equal(found[name], values, err_msg=name)
 
 
+@pytest.mark.parametrize("verb", ["maneuvers", "identify", "decode", "info"])
+def test_an_error_line_names_the_gzip(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], verb: str
+) -> None:
+    """It named what was made of it, in a folder that is gone."""
+    packed = tmp_path / "mine.csv.gz"
+    packed.write_bytes(gzip.compress(b"seconds,roll\n" + b"1,2\n" * 9))
+    assert main([verb, str(packed)]) != 0
+    said = capsys.readouterr().err
+    assert str(packed) in said and "host-" not in said
+
+
 def test_a_gzip_is_expanded_no_further_than_it_may(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

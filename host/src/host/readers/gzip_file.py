@@ -62,6 +62,13 @@ def expanded(source: Path) -> Path:
     return target
 
 
+def as_given(text: str) -> str:
+    """Return a line with the name of a gzip in place of the file that was made of it."""
+    for made, source in _given.items():
+        text = text.replace(str(made), str(source))
+    return text
+
+
 def given_path(path: Path) -> Path:
     """Return the gzip that a file was made of; else the file itself."""
     return _given.get(path, path)

@@ -159,6 +159,10 @@ def test_a_record_without_surfaces_is_fitted_whole(tmp_path: Path) -> None:
     whole = host.identify(record, **how).linear[0].result
     given = host.identify(record, **how, from_s=0.0, to_s=6.0).linear[0].result
     np.testing.assert_array_equal(whole.estimate, given.estimate)
+    # Run over such a record it said "no maneuver of elevator_rad, ...; found none".
+    predicted = host.predict(model, record)
+    (run,) = predicted.simulations[0].models
+    assert len(run.maneuvers) == 1 and run.maneuvers[0].samples >= len(record) - 1
 
 
 def test_measured_columns_alone_may_drive_equations(tmp_path: Path) -> None:

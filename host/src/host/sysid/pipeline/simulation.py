@@ -11,6 +11,7 @@ import numpy as np
 from host.errors import IdentificationError
 from host.sysid.answer.figure_kinds import Trace, histories
 from host.sysid.answer.mat_file import labels
+from host.sysid.checks.small_inputs import free_motion
 from host.sysid.flight.flown_maneuver import flown_maneuvers
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.maneuvers.maneuver_selection import excited_axes, merge_overlapping
@@ -194,7 +195,8 @@ def simulate(
     not_simulated: list[str] = []
     for label, model in models:
         axes = excited_axes(model.inputs)
-        own = [merge_overlapping([f for f in flight.maneuvers if f.axis in axes or f.given])]
+        there = flight.maneuvers or free_motion(flight.corrected)
+        own = [merge_overlapping([f for f in there if f.axis in axes or f.given])]
         flown = flown_maneuvers([flight], own)
         try:
             data = [m.cut(model) for m in flown]
