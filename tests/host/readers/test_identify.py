@@ -124,7 +124,7 @@ def test_every_verb_takes_it(
     assert "wrote        table.csv" in capsys.readouterr().out
     assert main(["maneuvers", path, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert "of which 57.3 deg stand for all" in told["notes"][-1]
+    assert "here 57.3 deg stand for full travel" in told["notes"][-1]
     found = told["maneuvers"]
     axes = [m["axis"] for m in found]
     assert axes.count("elevator_rad") == 3

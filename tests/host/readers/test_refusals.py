@@ -51,7 +51,7 @@ def test_outputs_that_are_passed_through(
     np.testing.assert_array_equal(turned.values, -control.channels.signals["elevator"].values)
     assert main(["info", str(path)]) == 0
     told = capsys.readouterr().out
-    assert "next flight: --output 1=aileron" in told
+    assert "now: --output 1=aileron" in told
     words = [word for one in GIVEN for word in ("--output", one)]
     assert main(["decode", str(path), *words, "--output", "table.csv"]) in (0, 3)
     assert "elevator_share" in (tmp_path / "table.csv").read_text().splitlines()[0]

@@ -118,6 +118,16 @@ def test_a_map_of_mine_begins_with_a_shipped_one(flown, tmp_path) -> None:  # ty
         read_flight_columns(path, Path("ardupilot"))
 
 
+def test_a_table_of_a_known_layout_is_told_its_map(flown, tmp_path) -> None:  # type: ignore[no-untyped-def]
+    path = tmp_path / "log.csv"
+    _inav(flown[1], path)
+    with pytest.raises(IdentificationError, match="argument mapping inav has these columns"):
+        read_flight_columns(path)
+    path.write_text("seconds,roll\n" + "1,2\n" * 50)
+    with pytest.raises(IdentificationError, match="no column t_s; name it in a map"):
+        read_flight_columns(path)
+
+
 def test_map_list_says_what_was_tried(capsys: pytest.CaptureFixture[str]) -> None:
     for verb in ("identify", "maneuvers", "predict"):
         assert main([verb, "--map", "list"]) == 0

@@ -9,6 +9,7 @@ from host.export.writer import Meta
 from host.physical.columns import COLUMNS, UNITS
 from host.readers.autopilot_flight import SURFACES, AutopilotFlight
 from host.readers.autopilot_log import FORMATS
+from host.readers.judgement import advice_lines
 
 
 def summarise_autopilot(flight: AutopilotFlight) -> dict[str, Any]:
@@ -63,7 +64,7 @@ def summary_lines(summary: dict[str, Any]) -> list[str]:
     refusal = summary["judgement"]["refusal"]
     if refusal:
         out.append(f"{'identify':<13}{refusal}")
-        out += [f"{'':<13}next flight: {one}" for one in summary["judgement"]["settings"]]
+        out += [f"{'':<13}{one}" for one in advice_lines(summary["judgement"]["settings"])]
     else:
         out += [f"{'identify':<13}{line}" for line in summary["table"]]
     return out

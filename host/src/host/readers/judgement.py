@@ -86,8 +86,13 @@ class Judgement:
     def table(self) -> list[str]:
         """Return lines: what can be identified, and the settings to change."""
         rows = [f"{what:<61}{verdict}" for what, verdict in self.answers]
-        rows += [f"next flight: {one}" for one in self.settings]
+        rows += advice_lines(self.settings)
         return rows
+
+
+def advice_lines(settings: Sequence[str]) -> list[str]:
+    """Return options of the command to run, and settings for the next flight, as lines."""
+    return [f"{'now' if one.startswith('--') else 'next flight'}: {one}" for one in settings]
 
 
 def judge(log: AutopilotLog, found: Channels, flown: Airborne) -> Judgement:

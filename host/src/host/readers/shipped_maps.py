@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from pathlib import Path
 
 from host.errors import IdentificationError
@@ -36,6 +37,17 @@ def map_file(given: Path) -> Path:
             f"{given}: no such map; a file, or of {', '.join(shipped_maps())} (`--map list`)"
         )
     return given
+
+
+def maps_for(columns: Container[str]) -> list[str]:
+    """Return the maps most of whose columns a table has, by names."""
+    found = []
+    for name in shipped_maps():
+        lines = read_toml(FOLDER / f"{name}.toml", IdentificationError)["columns"].values()
+        theirs = [line["from"] if isinstance(line, dict) else line for line in lines]
+        if sum(one in columns and not one.isdigit() for one in theirs) > 0.5 * len(theirs):
+            found.append(name)
+    return found
 
 
 def map_lines() -> list[str]:

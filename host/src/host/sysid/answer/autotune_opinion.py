@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from host.arrays import Array
-from host.constants import DEG_PER_RAD, NORMAL_95
+from host.constants import DEG_PER_RAD, NORMAL_95, RAD_PER_DEG
 from host.errors import IdentificationError
 from host.readers.autotune_model import HIGH_PASS_HZ, TunedModel
 from host.sysid.answer.frequency_pictures import pairs_of
@@ -27,7 +27,7 @@ AXIS = {"p_radps": "roll", "q_radps": "pitch", "r_radps": "yaw"}
 FREQUENCIES = 20
 # Cost of a mismatch of frequency responses, and what is acceptable (Tischler & Remple, Aircraft and
 # Rotorcraft System Identification, ch. 11).
-PHASE_WEIGHT, ACCEPTABLE = 0.01745, 100.0
+ACCEPTABLE = 100.0
 DECIBEL = 20.0 / np.log(10.0)
 SAMPLES_OF_PERIOD = 4.0
 STEP_S = 1.0 / (2.0 * np.pi * HIGH_PASS_HZ)  # a step is known for the time of the high-pass
@@ -72,7 +72,7 @@ class Opinion:
         """Cost of the mismatch: of magnitude in dB and of phase in degrees."""
         apart = np.log(self.theirs / self.ours)
         db, deg = DECIBEL * apart.real, DEG_PER_RAD * apart.imag
-        return float(20.0 * np.mean(db**2 + PHASE_WEIGHT * deg**2))
+        return float(20.0 * np.mean(db**2 + RAD_PER_DEG * deg**2))
 
     @property
     def verdict(self) -> str:

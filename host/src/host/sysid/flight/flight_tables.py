@@ -32,6 +32,7 @@ from host.readers.foreign_tables import (
 from host.readers.original_table import is_original, original_table
 from host.readers.readable_file import readable_file
 from host.readers.recorded import commanded_by_map, recording_of_table
+from host.readers.shipped_maps import maps_for
 from host.sysid.checks.data_finding import Finding
 from host.sysid.checks.unit_sign_checks import SURFACES
 from host.sysid.flight.log_columns import columns_of, of_log, recorded_log
@@ -84,7 +85,8 @@ def read_columns(
     notes = [*found.notes, *(finding.line for finding in found.findings)]
     if found.shares:
         notes.append(
-            f"{', '.join(found.shares)}: shares of full travel, of which 57.3 deg stand for all"
+            f"{', '.join(found.shares)}: the log has shares of full travel, no angles; here"
+            " 57.3 deg stand for full travel"
         )
     return found.columns, notes
 
@@ -189,8 +191,12 @@ def _refuse_unusable(
 ) -> None:
     """Refuse a table without time, with two columns of one name, or of several lengths."""
     if "t_s" not in used:
+        fitting = [
+            f"argument mapping {name} has these columns; " for name in maps_for(found.columns)
+        ]
         raise IdentificationError(
-            f"{called}: no column t_s; name it in a map (argument mapping); "
+            f"{called}: no column t_s; {''.join(fitting)}name it in a map (argument mapping), such"
+            ' as `t_s = { from = "TimeUS", unit = "us" }` below a line [columns]; '
             + listed(found.columns, found.unusable)
         )
     both = [k for k in used if k in found.twice and k not in theirs]
