@@ -13,7 +13,7 @@ from host.arrays import Array, BoolArray, IntArray
 from host.compiled import compiled_part
 from host.sysid.expressions.equation_code import of_equations
 from host.sysid.numerics.equation_recursion import (
-    STATE_LIMIT,
+    add_columns,
     add_jumps,
     end_of_step,
     multiply,
@@ -24,6 +24,7 @@ from host.sysid.numerics.equation_recursion import (
 )
 from host.sysid.numerics.fractional_delay import delayed_at
 from host.sysid.numerics.kalman_filter import filter_with
+from host.sysid.numerics.recursion import STATE_LIMIT
 
 SERIES_ORDER = 4  # of the transition over a step, as of the step itself
 
@@ -36,7 +37,7 @@ class EquationModel(NamedTuple):
     intensity : Array, shape (n,)
         Spectral density of the noise in each rate.
     inputs, held, late
-        As `inputs`, `held` and `shift` of `simulate_equations`.
+        As `inputs`, `held` and `shift` of `SampledEquations`.
     p, c, t : Array
         Parameters, constants, tables.
     column : IntArray, shape (parameters,)
@@ -53,7 +54,7 @@ class EquationModel(NamedTuple):
         Entry of the state that is the delay of this input; -1 where `inputs` are as late as they
         are.
     dt_s, substeps, ramp
-        As of `simulate_equations`.
+        As of `SampledEquations`.
     """
 
     intensity: Array
@@ -152,15 +153,6 @@ def input_rate(
     input_within(inputs, k, 1.0, shift, input_column, ramp, rate, unused)
     for j in range(inputs.shape[1]):
         rate[j] -= begin[j]
-
-
-@compiled_part
-def add_columns(by: Array, column: IntArray, out: Array) -> None:
-    """Add the columns of slopes `by` (rows, q) to those of the unknowns that they belong to."""
-    for b in range(len(column)):
-        if column[b] >= 0:
-            for i in range(len(out)):
-                out[i, column[b]] += by[i, b]
 
 
 @compiled_part

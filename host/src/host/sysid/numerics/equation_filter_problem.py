@@ -19,6 +19,7 @@ from host.errors import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.numerics.equation_filter import EquationModel, filter_equations
+from host.sysid.numerics.equation_recursion import SampledEquations
 from host.sysid.numerics.innovation_problem import (
     Filtered,
     InnovationLikelihood,
@@ -27,7 +28,7 @@ from host.sysid.numerics.innovation_problem import (
 )
 from host.sysid.numerics.intermittent_filter import SequentialInnovations
 from host.sysid.numerics.kalman_filter import filter_without_slopes
-from host.sysid.numerics.nonlinear_problem import Given, NonlinearProblem
+from host.sysid.numerics.nonlinear_problem import NonlinearProblem
 from host.sysid.numerics.process_noise import air_states, steady_covariance
 
 STEP_BOUNDS = 1e-4  # of a bound: differences
@@ -112,20 +113,20 @@ class EquationFilterProblem(InnovationProblem):
         intensity, variance = self.noise(theta)
         if not (np.isfinite(intensity).all() and np.isfinite(variance).all()):
             return None
-        none = np.full(max(n, outputs, len(g.shift), len(g.parameters)), -1, dtype=np.int64)
+        none = np.full(max(n, outputs, len(g.shift), len(g.p)), -1, dtype=np.int64)
         delay_s = np.array([0.0 if k < 0 else theta[k] for k in self._late])
         equations = EquationModel(
             intensity=intensity,
             inputs=g.inputs,
             held=g.held,
             late=g.shift,
-            p=g.parameters,
-            column=none[: len(g.parameters)],
-            c=problem.constants,
-            t=problem.tables,
+            p=g.p,
+            column=none[: len(g.p)],
+            c=g.c,
+            t=g.t,
             bias=g.bias,
             bias_column=none[:n],
-            offset=problem.output_offsets(g.local),
+            offset=problem.output_offsets(problem.local(number, theta)),
             offset_column=none[:outputs],
             delay_s=delay_s,
             delay_column=none[:outputs],
@@ -145,7 +146,7 @@ class EquationFilterProblem(InnovationProblem):
         no_slopes = np.zeros((*e.shape, 0))
         return SequentialInnovations(e, independent, deviation**2, no_slopes, no_slopes)
 
-    def _first_covariance(self, g: Given, intensity: Array) -> Array:
+    def _first_covariance(self, g: SampledEquations, intensity: Array) -> Array:
         """Return the covariance of the states at the first sample: of air without a start."""
         source, states = self._source, self.model.states
         n, m = len(states), g.inputs.shape[1]
@@ -153,8 +154,8 @@ class EquationFilterProblem(InnovationProblem):
         air = [k for k in air_states(states) if states[k] not in self.model.initial_states]
         if not air:
             return result
-        by_input, by_parameter = np.zeros((n, m)), np.zeros((n, len(g.parameters)))
-        values = (g.parameters, source.constant_values, source.table_values)
+        by_input, by_parameter = np.zeros((n, m)), np.zeros((n, len(g.p)))
+        values = (g.p, source.constant_values, source.table_values)
         try:
             source.code.functions["rate_slopes"](
                 g.start, g.inputs[0], *values, f, A, by_input, by_parameter

@@ -8,15 +8,69 @@ that it is given (internal differentiation; Bock, in: Modelling of Chemical Reac
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from host.arrays import Array, IntArray
 from host.compiled import compiled_part
 from host.sysid.expressions.equation_code import of_equations
+from host.sysid.numerics.recursion import STATE_LIMIT
 
-STATE_LIMIT = 1e8  # a response beyond it has diverged
 SHORTEST = 1e-9  # of a sample: no step is
 BESIDE = 1e-6  # of a sample: before and behind a jump
+# Of each stage: weight, how late its inputs are, how far ahead of the begin the next stage is.
+STAGES = ((1.0, 0.0, 0.5), (2.0, 0.5, 0.5), (2.0, 0.5, 1.0), (1.0, 1.0, 0.5))
+
+
+class SampledEquations(NamedTuple):
+    """Equations over the samples of one maneuver, by L unknowns: what the simulator takes.
+
+    Attributes
+    ----------
+    start, by_start : Array, shape (n,), (n, L)
+        State of the first sample and its slopes; without unknowns there are no slopes.
+    inputs : Array, shape (samples, m)
+        As late as they are: what outputs see, and rates where inputs move on a line.
+    held : Array, shape (samples, m)
+        Not yet late: what rates see where inputs are held.
+    shift : Array, shape (m,)
+        Samples that `held` is late by. A step ends where one jumps: spread over its sample, a
+        command 30 ms late was found 34.5 ms late, of records of 20 and 40 ms a sample.
+    by_delay : Array, shape (samples, m)
+        Slopes of each input by its delay.
+    input_column : IntArray, shape (m,)
+        Unknown that is this delay; -1 for none.
+    p, column : Array, IntArray, shape (parameters,)
+        Parameters, and which unknown each is; -1 where it is known.
+    c, t : Array
+        Constants, tables.
+    bias, bias_column : Array, IntArray, shape (n,)
+        Added to the rates, and which unknown each is.
+    dt_s : float
+    substeps : int
+        Steps from sample to sample.
+    ramp : float
+        Share of the way to the next sample that an input goes within a step: 1 is first-order hold,
+        0 is zero-order hold.
+    """
+
+    start: Array
+    by_start: Array
+    inputs: Array
+    held: Array
+    shift: Array
+    by_delay: Array
+    input_column: IntArray
+    p: Array
+    column: IntArray
+    c: Array
+    t: Array
+    bias: Array
+    bias_column: IntArray
+    dt_s: float
+    substeps: int
+    ramp: float
 
 
 def rates(x: Array, u: Array, p: Array, c: Array, t: Array, f: Array) -> None:
@@ -110,102 +164,71 @@ def add_jumps(
             S[i, input_column[j]] += work[0, i] - work[1, i]
 
 
-def simulate_equations(
-    start: Array,
-    inputs: Array,
-    held: Array,
-    shift: Array,
-    p: Array,
-    c: Array,
-    t: Array,
-    bias: Array,
-    dt_s: float,
-    substeps: int,
-    ramp: float,
-    x: Array,
-    y: Array,
-) -> bool:
-    """Simulate states and outputs.
+@compiled_part
+def add_columns(by: Array, column: IntArray, out: Array) -> None:
+    """Add the columns of slopes `by` (rows, q) to those of the unknowns that they belong to."""
+    for b in range(len(column)):
+        if column[b] >= 0:
+            for i in range(len(out)):
+                out[i, column[b]] += by[i, b]
 
-    Parameters
-    ----------
-    start : Array, shape (n,)
-    inputs : Array, shape (samples, m)
-        As late as they are: what outputs see, and rates where inputs move on a line.
-    held : Array, shape (samples, m)
-        Not yet late: what rates see where inputs are held.
-    shift : Array, shape (m,)
-        Samples that `held` is late by. A step ends where one jumps: spread over its sample, a
-        command 30 ms late was found 34.5 ms late, of records of 20 and 40 ms a sample.
-    p, c, t : Array
-        Parameters, constants, tables.
-    bias : Array, shape (n,)
-        Added to the rates.
-    dt_s : float
-    substeps : int
-        Steps from sample to sample.
-    ramp : float
-        Share of the way to the next sample that an input goes within a step: 1 is first-order hold,
-        0 is zero-order hold.
-    x : Array, shape (samples, n)
-        Overwritten.
-    y : Array, shape (samples, p)
-        Overwritten.
 
-    Returns
-    -------
-    bool
-        Whether every state stayed below `STATE_LIMIT`.
+@compiled_part
+def add_scaled(by: Array, scale: Array, column: IntArray, out: Array) -> None:
+    """Do the same with each column `scale` (q,) times."""
+    for b in range(len(column)):
+        if column[b] >= 0:
+            for i in range(len(out)):
+                out[i, column[b]] += by[i, b] * scale[b]
+
+
+@compiled_part
+def take_stage_inputs(
+    inputs: Array, by_delay: Array, k: int, share: float, ramp: float, u: Array, slope: Array
+) -> None:
+    """Write inputs a share of the way behind sample `k` into `u`, their slopes into `slope`.
+
+    Where inputs are held, what their delay does is in the jumps.
     """
-    n, m = len(start), inputs.shape[1]
-    state, stage, sum_ = start.copy(), np.zeros(n), np.zeros(n)
-    u, f = np.zeros(m), np.zeros(n)
-    for k in range(len(inputs)):
-        for i in range(n):
-            if not abs(state[i]) < STATE_LIMIT:
-                return False
-            x[k, i] = state[i]
-        readings(state, inputs[k], p, c, t, y[k])
-        if k == len(inputs) - 1:
-            break
-        position, whole = 0.0, 0
-        while whole < substeps:
-            boundary = (whole + 1.0) / substeps
-            end = end_of_step(position, boundary, shift, ramp)
-            h = (end - position) * dt_s
-            for i in range(n):
-                stage[i] = state[i]
-                sum_[i] = 0.0
-            for number in range(4):
-                late = 0.0 if number == 0 else (1.0 if number == 3 else 0.5)
-                if ramp == 0.0:
-                    take_held(held, k + 0.5 * (position + end), shift, u)
-                else:
-                    share = ramp * (position + late * (end - position))
-                    for j in range(m):
-                        u[j] = inputs[k, j] + share * (inputs[k + 1, j] - inputs[k, j])
-                rates(stage, u, p, c, t, f)
-                weight = 1.0 if number == 0 or number == 3 else 2.0
-                ahead = h if number == 2 else 0.5 * h
-                for i in range(n):
-                    rate = f[i] + bias[i]
-                    sum_[i] += weight * rate
-                    stage[i] = state[i] + ahead * rate
-            for i in range(n):
-                state[i] += h / 6.0 * sum_[i]
-            position = end
-            if end == boundary:
-                whole += 1
-    return True
+    for j in range(len(u)):
+        u[j] = inputs[k, j] + ramp * share * (inputs[k + 1, j] - inputs[k, j])
+        slope[j] = ramp * (by_delay[k, j] + share * (by_delay[k + 1, j] - by_delay[k, j]))
 
 
-def simulate_with_slopes(
+@compiled_part
+def add_rates(
+    rate: Array, weight: float, ahead: float, begin: Array, sum_: Array, x: Array
+) -> None:
+    """Add rates (n, ...) to their weighted sum, and write the state `ahead` from the begin."""
+    for i in range(len(x)):
+        for j in range(x.shape[1]):
+            sum_[i, j] += weight * rate[i, j]
+            x[i, j] = begin[i, j] + ahead * rate[i, j]
+
+
+@compiled_part
+def add_times(factor: float, of: Array, out: Array) -> None:
+    """Add an array (n, ...) so many times."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] += factor * of[i, j]
+
+
+@compiled_part
+def add_ones(column: IntArray, out: Array) -> None:
+    """Add one to the slope of each row by its own unknown."""
+    for i in range(len(out)):
+        if column[i] >= 0:
+            out[i, column[i]] += 1.0
+
+
+def run_equations(
     start: Array,
-    start_slopes: Array,
+    by_start: Array,
     inputs: Array,
     held: Array,
     shift: Array,
-    input_slopes: Array,
+    by_delay: Array,
     input_column: IntArray,
     p: Array,
     column: IntArray,
@@ -220,95 +243,63 @@ def simulate_with_slopes(
     y: Array,
     slopes: Array,
 ) -> bool:
-    """Simulate states and outputs, and the sensitivities of the outputs.
+    """Simulate states (samples, n), outputs (samples, p) and slopes of these (p, samples, L).
 
-    Parameters
-    ----------
-    start, inputs, held, shift, p, c, t, bias, dt_s, substeps, ramp, x, y
-        As of `simulate_equations`.
-    start_slopes : Array, shape (n, w)
-        Of the initial state by each of w unknowns.
-    input_slopes : Array, shape (samples, m)
-        Of each input by its delay.
-    input_column : IntArray, shape (m,)
-        Unknown that is this delay; -1 for none.
-    column : IntArray, shape (parameters,)
-        Unknown that each parameter is; -1 where it is known.
-    bias_column : IntArray, shape (n,)
-        The same for `bias`.
-    slopes : Array, shape (p, samples, w)
-        Overwritten.
+    The first arguments are those of `SampledEquations`; the last three are overwritten.
+
+    Returns
+    -------
+    bool
+        Whether every state stayed below `STATE_LIMIT`.
     """
-    n, m, w = len(start), inputs.shape[1], start_slopes.shape[1]
-    outputs, q = y.shape[1], len(column)
-    state, stage, sum_ = start.copy(), np.zeros(n), np.zeros(n)
-    S, T, sum_S, K = start_slopes.copy(), np.zeros((n, w)), np.zeros((n, w)), np.zeros((n, w))
-    u, f = np.zeros(m), np.zeros(n)
+    (n, L), m, q, outputs = by_start.shape, len(shift), len(column), y.shape[1]
+    state, stage, total, f = np.zeros((4, n, 1))
+    state[:, 0] = start
+    S, T, total_S, K = np.zeros((4, n, L))
+    S[:, :] = by_start
+    u, slope = np.zeros(m), np.zeros(m)
     fx, fu, fp = np.zeros((n, n)), np.zeros((n, m)), np.zeros((n, q))
     yx, yu, yp = np.zeros((outputs, n)), np.zeros((outputs, m)), np.zeros((outputs, q))
     work, beside = np.zeros((2, n)), np.zeros((2, m))
     for k in range(len(inputs)):
         for i in range(n):
-            if not abs(state[i]) < STATE_LIMIT:
+            if not abs(state[i, 0]) < STATE_LIMIT:
                 return False
-            x[k, i] = state[i]
-        reading_slopes(state, inputs[k], p, c, t, y[k], yx, yu, yp)
-        multiply(yx, S, slopes[:, k, :])
-        for j in range(q):
-            if column[j] >= 0:
-                slopes[:, k, column[j]] += yp[:, j]
-        for j in range(m):
-            if input_column[j] >= 0:
-                slopes[:, k, input_column[j]] += yu[:, j] * input_slopes[k, j]
-        if k == len(inputs) - 1:
-            break
+            x[k, i] = state[i, 0]
+        if L == 0:
+            readings(state[:, 0], inputs[k], p, c, t, y[k])
+        else:
+            reading_slopes(state[:, 0], inputs[k], p, c, t, y[k], yx, yu, yp)
+            multiply(yx, S, slopes[:, k, :])
+            add_columns(yp, column, slopes[:, k, :])
+            add_scaled(yu, by_delay[k], input_column, slopes[:, k, :])
         position, whole = 0.0, 0
-        while whole < substeps:
-            boundary = (whole + 1.0) / substeps
-            end = end_of_step(position, boundary, shift, ramp)
+        while whole < substeps and k < len(inputs) - 1:
+            end = end_of_step(position, (whole + 1.0) / substeps, shift, ramp)
             h = (end - position) * dt_s
-            for i in range(n):
-                stage[i] = state[i]
-                sum_[i] = 0.0
-            T[:, :] = S
-            sum_S[:, :] = 0.0
+            stage[:, :], total[:, :], T[:, :], total_S[:, :] = state, 0.0, S, 0.0
             for number in range(4):
-                late = 0.0 if number == 0 else (1.0 if number == 3 else 0.5)
-                share = ramp * (position + late * (end - position))
+                weight, late, ahead = STAGES[number]
+                share = position + late * (end - position)
+                take_stage_inputs(inputs, by_delay, k, share, ramp, u, slope)
                 if ramp == 0.0:
                     take_held(held, k + 0.5 * (position + end), shift, u)
+                if L == 0:
+                    rates(stage[:, 0], u, p, c, t, f[:, 0])
                 else:
-                    for j in range(m):
-                        u[j] = inputs[k, j] + share * (inputs[k + 1, j] - inputs[k, j])
-                rate_slopes(stage, u, p, c, t, f, fx, fu, fp)
-                multiply(fx, T, K)
-                for j in range(q):
-                    if column[j] >= 0:
-                        K[:, column[j]] += fp[:, j]
-                for j in range(m):
-                    if input_column[j] >= 0 and ramp != 0.0:
-                        slope = input_slopes[k, j]
-                        slope += share * (input_slopes[k + 1, j] - slope)
-                        K[:, input_column[j]] += fu[:, j] * slope
+                    rate_slopes(stage[:, 0], u, p, c, t, f[:, 0], fx, fu, fp)
+                    multiply(fx, T, K)
+                    add_columns(fp, column, K)
+                    add_scaled(fu, slope, input_column, K)
+                    add_ones(bias_column, K)
                 for i in range(n):
-                    if bias_column[i] >= 0:
-                        K[i, bias_column[i]] += 1.0
-                weight = 1.0 if number == 0 or number == 3 else 2.0
-                ahead = h if number == 2 else 0.5 * h
-                for i in range(n):
-                    rate = f[i] + bias[i]
-                    sum_[i] += weight * rate
-                    stage[i] = state[i] + ahead * rate
-                for i in range(n):
-                    for j in range(w):
-                        sum_S[i, j] += weight * K[i, j]
-                        T[i, j] = S[i, j] + ahead * K[i, j]
-            for i in range(n):
-                state[i] += h / 6.0 * sum_[i]
-            S += h / 6.0 * sum_S
-            if ramp == 0.0:
-                add_jumps(state, k + end, held, shift, input_column, p, c, t, S, work, beside)
+                    f[i, 0] += bias[i]
+                add_rates(f, weight, ahead * h, state, total, stage)
+                add_rates(K, weight, ahead * h, S, total_S, T)
+            add_times(h / 6.0, total, state)
+            add_times(h / 6.0, total_S, S)
+            if ramp == 0.0 and L > 0:
+                add_jumps(state[:, 0], k + end, held, shift, input_column, p, c, t, S, work, beside)
+            whole += 1 if end == (whole + 1.0) / substeps else 0
             position = end
-            if end == boundary:
-                whole += 1
     return True

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,28 +12,15 @@ from host.sysid.expressions.expression_graph import ExpressionError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.equation_recursion import simulate_equations, simulate_with_slopes
+from host.sysid.numerics.equation_recursion import SampledEquations, run_equations
 from host.sysid.numerics.fractional_delay import delay_columns, slope_by_delay
 from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics.simulator import EquationMotion
 
 MOST_SUBSTEPS = 64
 # Of an output's spread: what halving the step may move it by. Noise is a thousandth at least
 # (`CLEAN_SHARE`): over 10 000 samples this is a tenth of a half-width, were it all of one sign.
 STEP_TOLERANCE = 1e-6
-
-
-@dataclass(frozen=True, slots=True)
-class Given:
-    """Inputs of the simulation of one maneuver at a parameter vector."""
-
-    local: Array  # unknowns of the maneuver, a zero behind
-    start: Array
-    inputs: Array  # as late as they are
-    held: Array  # not yet late, and by how many samples they are where they are held
-    shift: Array
-    input_slopes: Array  # by their delay
-    parameters: Array
-    bias: Array
 
 
 class NonlinearProblem(OutputProblem):
@@ -50,9 +36,7 @@ class NonlinearProblem(OutputProblem):
         super().__init__(model, maneuvers)
         self.nonlinear = model
         self.source = model.source
-        code = self.source.code
-        self._simulate = code.loop(simulate_equations)
-        self._with_slopes = code.loop(simulate_with_slopes)
+        self._run = self.source.code.loop(run_equations)
         place = {p.name: k for k, p in enumerate(model.parameters)}
         first_own = self.n_common + self.n_local - len(model.own_parameters)
         place |= {p.name: first_own + k for k, p in enumerate(model.own_parameters)}
@@ -113,39 +97,17 @@ class NonlinearProblem(OutputProblem):
                 self.source.check_first_sample(
                     g.start.tolist(),
                     maneuver.inputs[0].tolist(),
-                    g.parameters[: len(self.source.parameters)].tolist(),
+                    g.p[: len(self.source.parameters)].tolist(),
                 )
             except ExpressionError as error:
                 raise IdentificationError(
                     f"{error}, at the start values of model {self.model.name}"
                 ) from None
 
-    def _simulated(
-        self, number: int, theta: Array, slope: Array | None
-    ) -> tuple[Array, Array] | None:
-        """Simulate a maneuver by steps between samples."""
-        g, dt_s = self.given(number, theta), self._parts[number].dt_s
-        x = np.empty((len(g.inputs), len(self.model.states)))
-        y = np.empty((len(g.inputs), len(self.model.outputs)))
-        if slope is None:
-            run = finite(
-                self._simulate, g.start, g.inputs, g.held, g.shift, g.parameters, self.constants,
-                self.tables, g.bias, dt_s, self.substeps, self.ramp, x, y,
-            )  # fmt: skip
-        else:
-            run = finite(
-                self._with_slopes, g.start, self._sampler.by_start, g.inputs, g.held, g.shift,
-                g.input_slopes, self.input_column, g.parameters, self.column, self.constants,
-                self.tables, g.bias, self.bias_column, dt_s, self.substeps, self.ramp, x, y, slope,
-            )  # fmt: skip
-        if not run:
-            return None
-        out = np.ascontiguousarray(y.T)
-        out += self.output_offsets(g.local)[:, None]
-        if slope is not None:
-            for j in np.flatnonzero(self.offset_column >= 0):
-                slope[j, :, self.offset_column[j]] += 1.0
-        return out, x
+    def motion(self, number: int, theta: Array, slopes: bool) -> EquationMotion:
+        """Return what the simulator takes of a maneuver, slopes or not."""
+        offset = self.output_offsets(self.local(number, theta))
+        return EquationMotion(self._run, self.given(number, theta), offset, self.offset_column)
 
     def model_at(self, theta: Array) -> LinearModel:
         """Return the model with the tangent at the mean of its simulated states."""
@@ -157,7 +119,7 @@ class NonlinearProblem(OutputProblem):
         own = np.mean([theta[part.index[self.first_own :]] for part in self._parts], axis=0)
         return self.nonlinear.tangent_at(x, u, theta, own)
 
-    def given(self, number: int, theta: Array) -> Given:
+    def given(self, number: int, theta: Array) -> SampledEquations:
         """Return the arguments of the simulation of one maneuver at a parameter vector."""
         part = self._parts[number]
         local = self.local(number, theta)
@@ -171,15 +133,23 @@ class NonlinearProblem(OutputProblem):
                 at_once = held[:, [j]]
                 inputs[:, j] = delay_columns(at_once, shift)[:, 0]
                 slopes[:, j] = slope_by_delay(at_once, shift)[:, 0] / part.dt_s
-        return Given(
-            local=local,
+        return SampledEquations(
             start=self._sampler.start(local),
+            by_start=self._sampler.by_start,
             inputs=inputs,
             held=held,
             shift=shifts,
-            input_slopes=slopes,
-            parameters=self.nonlinear.parameter_vector(theta, local[self.first_own : -1]),
+            by_delay=slopes,
+            input_column=self.input_column,
+            p=self.nonlinear.parameter_vector(theta, local[self.first_own : -1]),
+            column=self.column,
+            c=self.constants,
+            t=self.tables,
             bias=local[self.bias_column],
+            bias_column=self.bias_column,
+            dt_s=part.dt_s,
+            substeps=self.substeps,
+            ramp=self.ramp,
         )
 
     def output_offsets(self, local: Array) -> Array:
@@ -216,11 +186,3 @@ class NonlinearProblem(OutputProblem):
         self._stepped |= compared
         self.substeps = chosen if compared else begun
         return self.substeps != begun
-
-
-def finite(run: Callable[..., bool], *given: object) -> bool:
-    """Run a kernel; as Python it raises where the machine's numbers would be infinite or NaN."""
-    try:
-        return bool(run(*given)) and bool(np.isfinite(given[-1]).all())  # type: ignore[call-overload]
-    except (ArithmeticError, ValueError):
-        return False

@@ -12,9 +12,9 @@ from host.errors import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.fractional_delay import delay_columns, slope_by_delay
-from host.sysid.numerics.recursion import propagate, simulate
 from host.sysid.numerics.response import Response
 from host.sysid.numerics.sampled_model import SampledModel, Sampler
+from host.sysid.numerics.simulator import EquationMotion, MatrixMotion, simulate_with_slopes
 
 # Of an output's motion: no column is better than this, nor the model of it. Without noise in one
 # column its information drowned that of all others, and 73 to 93 % of the intervals held.
@@ -230,29 +230,14 @@ class OutputProblem:
 
         Sensitivities of the outputs overwrite `slope` (p, samples, L).
         """
-        found = self._simulated(number, theta, slope)
+        found = simulate_with_slopes(self.motion(number, theta, slope is not None), slope)
         if found is not None:
             self._delay(found[0], slope, self.local(number, theta), self._parts[number].dt_s)
         return found
 
-    def _simulated(
-        self, number: int, theta: Array, slope: Array | None
-    ) -> tuple[Array, Array] | None:
-        """Return outputs that are not late, and states.
-
-        The sensitivities obey dx/dtheta[k+1] = Phi dx/dtheta[k] + d[Phi Gamma]/dtheta z[k]
-        (EQUATIONS.md, eq. 25).
-        """
-        s = self.sampled(number, theta, slopes=slope is not None)
-        finite, z = simulate(s.step, self._parts[number].drive, s.start)
-        if not finite:
-            return None
-        if slope is not None:
-            propagate(s.step, s.by_step, z, s.C, s.by_start, slope)
-            for own, by_row in zip(slope, s.by_read, strict=True):
-                free = np.flatnonzero(by_row.any(axis=0))
-                own[:, free] += z @ by_row[:, free]
-        return s.read @ z.T, z[:, : len(s.start)]
+    def motion(self, number: int, theta: Array, slopes: bool) -> MatrixMotion | EquationMotion:
+        """Return what the simulator takes of a maneuver; its outputs are not late yet."""
+        return MatrixMotion(self.sampled(number, theta, slopes=slopes), self.drive(number))
 
     def check_start(self, theta: Array) -> None:
         """Refuse a start where equations have no value; a linear model has one everywhere."""

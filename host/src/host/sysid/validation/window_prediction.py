@@ -18,8 +18,8 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel, has_equations
 from host.sysid.numerics.discretisation import discretise
-from host.sysid.numerics.equation_recursion import simulate_equations
-from host.sysid.numerics.nonlinear_problem import NonlinearProblem, finite
+from host.sysid.numerics.nonlinear_problem import NonlinearProblem
+from host.sysid.numerics.simulator import simulate_with_slopes
 from host.sysid.validation.free_simulation import Biases
 
 WINDOWS_S = (0.1, 0.5, 1.0, 2.0)
@@ -141,12 +141,11 @@ def _restarted_equations(
     simulation. What an output of its name adds to a state is taken off the measured one.
     """
     e, code = model.source, model.source.code
-    simulated = code.loop(simulate_equations)
     p = model.parameter_vector(np.zeros(0), bias.own)
     problem = NonlinearProblem(replace(model, delays=()), [maneuver])
-    problem.choose_step(problem.first_guess())
-    ramp = 1.0 if model.hold == "foh" else 0.0
-    no_delay = np.zeros(len(model.inputs))
+    guess = problem.first_guess()
+    problem.choose_step(guess)
+    motion = problem.motion(0, guess, slopes=False)
     result = np.full((len(starts), steps, len(model.outputs)), np.nan)
     for number, k in enumerate(starts.tolist()):
         x, added = free[k].copy(), np.zeros(len(model.outputs))
@@ -163,12 +162,10 @@ def _restarted_equations(
             elif state in guessed:
                 x[row] = guessed[state]
         u = np.ascontiguousarray(maneuver.inputs[k : k + steps + 1])
-        states, y = np.empty((steps + 1, len(x))), np.empty((steps + 1, len(model.outputs)))
-        if finite(
-            simulated, x, u, u, no_delay, p, e.constant_values, e.table_values, bias.rate,
-            maneuver.dt_s, problem.substeps, ramp, states, y,
-        ):  # fmt: skip
-            result[number] = y[1:] + bias.output
+        given = motion.given._replace(start=x, inputs=u, held=u, p=p, bias=bias.rate)
+        found = simulate_with_slopes(replace(motion, given=given, offset=bias.output))
+        if found is not None:
+            result[number] = found[0][:, 1:].T
     return result
 
 
