@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -10,7 +9,6 @@ import pytest
 from host.readers.column_sampling import quantum, sampling_of
 from host.sysid.estimators.filter_error_gust import SLOW_IN_CALM
 from host.sysid.flight import read_flight_columns
-from host.sysid.linear import Answer as LinearAnswer
 from host.sysid.models import Maneuver, Trim
 from host.sysid.models.templates import longitudinal
 from host.sysid.numerics import OutputProblem
@@ -167,43 +165,10 @@ def test_a_sensor_that_must_move_and_does_not_is_stuck(name: str, made: str) -> 
     assert "bridged" not in kept.columns
 
 
-SPOILT: dict[str, Callable[[pd.DataFrame], pd.DataFrame]] = {
-    "no": lambda t: t,
-    "quantised and held": lambda t: held(quantised(t)),
-    "all held": lambda t: held(t, tuple(NOISE)),
-}
-
-
-@cache
-def identified(spoilt: str) -> LinearAnswer:
-    """Return the default answer to a record whose columns are spoilt."""
-    table = SPOILT[spoilt](record(0))
-    return host.identify(table, models="longitudinal", stretches=[(4.0, 19.5)]).linear[0]
-
-
-@pytest.mark.parametrize("spoilt", ["quantised and held", "all held"])
-def test_spoilt_columns_give_the_unspoilt_estimates(spoilt: str) -> None:
-    """Drawn lines for measurements held half of the truths, and M_alpha was 17 % off.
-
-    How often intervals hold is counted by the study `spoilt_columns`.
-    """
-    whole, found = identified("no").result, identified(spoilt).result
-    half = found.half_width()
-    for name, true in TRUE.items():
-        k = found.index(name)
-        assert abs(found.estimate[k] - whole.value(name)) <= half[k], name
-        assert abs(found.estimate[k] - true) <= 1.5 * half[k], name
-
-
-def test_a_slow_column_leaves_the_gust_filter() -> None:
-    answer = identified("quantised and held")
-    assert answer.method == "filter-error-gust"
-    assert answer.result.residual_kind == "innovation"
-
-
 def test_in_calm_air_output_error_tells_delays_by_slow_columns() -> None:
     """By the filter the gyro's delay scattered twice as far as it was known."""
-    result = identified("all held").result
+    table = held(record(0), tuple(NOISE))
+    result = host.identify(table, models="longitudinal", stretches=[(4.0, 19.5)]).linear[0].result
     assert result.residual_kind == "output"
     assert SLOW_IN_CALM in result.warnings
     assert {"delay_vanes_s", "delay_imu_s"} <= set(result.names)

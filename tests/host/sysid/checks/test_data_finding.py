@@ -12,7 +12,6 @@ from host.errors import IdentificationError
 from host.sysid.checks import CHECKS, accepted_checks, check, checked, open_channels
 
 import host
-from tests.host.logs import ROOT
 
 G = 9.80665
 Columns = dict[str, np.ndarray]
@@ -162,18 +161,3 @@ def test_small_inputs_are_fitted_as_one_stretch(record: pd.DataFrame) -> None:
         assert value == pytest.approx(same, rel=0.01), name
         # What airspeed and attitude do is of second order: seven times smaller in this record.
         assert value == pytest.approx(other, rel=0.25), name
-
-
-THOR = ROOT / "tests/data/thor75"
-
-
-def test_a_real_aircraft_goes_through_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:
-    """Indicated airspeed, commands for positions, feedback: findings and doubts, no trust."""
-    source, mapping = THOR / "flight75_240_270.csv", THOR / "map.toml"
-    options = ["identify", str(source), "--from", "245", "--to", "265"]
-    options += ["--map", str(mapping), "--model", "short-period", "--json"]
-    assert main(options) == 0
-    answer = json.loads(capsys.readouterr().out)
-    assert answer["answers"]
-    said = " ".join(line for a in answer["answers"] for line in a["verdict"])
-    assert "good (within 10 %):  nothing" in said

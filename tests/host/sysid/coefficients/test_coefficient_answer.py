@@ -4,7 +4,6 @@ import json
 import tomllib
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
@@ -15,12 +14,9 @@ from host.sysid.coefficients import CoefficientAnswer
 from host.sysid.coefficients.coefficient_estimator import merged_windows
 from host.sysid.coefficients.coefficient_modes import coefficient_modes, quantities
 from host.sysid.conversion import ConversionPoint, to_derivatives
-from host.sysid.flight import read_columns
 from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.pipeline import Identification, identify
 from scipy import io
-
-from tests.host.sysid.at_hand import identify_coefficients
 
 NAME = "ultrastick25e"
 RED = "#d62728"
@@ -36,9 +32,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def answer(folder: Path) -> CoefficientAnswer:
-    columns, _ = read_columns(folder / "flight.csv")
-    return identify_coefficients(columns, NAME)
+def found(folder: Path) -> Identification:
+    """What `host identify` finds in that flight, once for all below."""
+    source, truth = folder / "flight.csv", folder / "flight.truth.toml"
+    return identify(source, aircraft=NAME, models="coefficients", truth=truth)
+
+
+@pytest.fixture(scope="module")
+def answer(found: Identification) -> CoefficientAnswer:
+    assert found.coefficients is not None
+    return found.coefficients
 
 
 def test_finds_all_maneuvers_and_their_truth(folder: Path, answer: CoefficientAnswer) -> None:
@@ -168,17 +171,12 @@ def test_delays_left_over_are_told(folder: Path, answer: CoefficientAnswer) -> N
 
 def test_says_what_to_trust_and_why_not(
     folder: Path,
+    found: Identification,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,
 ) -> None:
-    found: list[Identification] = []
-
-    def kept(*given: Any, **options: Any) -> Identification:
-        found.append(identify(*given, **options))
-        return found[0]
-
-    monkeypatch.setattr("host.sysid.pipeline.stages.identify", kept)
+    monkeypatch.setattr("host.sysid.pipeline.stages.identify", lambda *_, **__: found)
     again = tmp_path / "again.toml"
     flags = ["--aircraft", NAME, "--model", "coefficients"]
     source = str(folder / "flight.csv")
@@ -192,7 +190,7 @@ def test_says_what_to_trust_and_why_not(
     assert "tilt" in table["Cn_p"]["widened_by"]
     assert not table["Cm_q"]["flagged"]
     assert any("not known: Cn_p" in line for line in document["verdict"])
-    assert any("prediction of unseen maneuvers (9 of 9" in line for line in document["verdict"])
+    assert len(document["unseen"]["windows"]) == 9
     unseen = document["unseen"]["nrmse"]
     assert set(unseen) == {"CL", "CD", "Cm", "CY", "Cl", "Cn"}
     assert all(s["fitted"] < s["unseen"] < 1.1 * s["fitted"] for s in unseen.values())
@@ -200,10 +198,9 @@ def test_says_what_to_trust_and_why_not(
     assert all(r["p_value"] < 0.01 for r in scattered.values())
     named = [line for line in document["verdict"] if "maneuvers disagree on" in line]
     assert len(named) == len(scattered)
-    text = str(found[0])
-    assert text.startswith("note: no GPS checked the clock")
-    assert "\ncoefficients: 3 maneuvers of the elevator, 6 of aileron and rudder" in text
-    assert "of 24 intervals hold the truth" in text
+    text = str(found)
+    assert text.startswith("Known from this flight: ")
+    assert "of 24 intervals" in text
     assert {p.name for p in (tmp_path / "plots").iterdir()} == {
         f"coefficients_{k}.svg" for k in ("fit", "poles", "intervals", "input")
     }
