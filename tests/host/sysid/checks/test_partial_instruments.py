@@ -273,6 +273,12 @@ LATERAL_COLUMNS = (
 )  # fmt: skip
 
 
+def flown_on(table: pd.DataFrame, axis: str) -> pd.DataFrame:
+    """Return the part of a trainer's flight in which an axis is flown: elevator first."""
+    lateral = table["t_s"] > 41.0
+    return table[lateral if axis == "lateral" else ~lateral].reset_index(drop=True)
+
+
 @pytest.fixture(scope="module")
 def trainer() -> pd.DataFrame:
     """A flight in calm air, airspeed and attitude vary."""
@@ -293,7 +299,7 @@ def trainer() -> pd.DataFrame:
 def test_columns_of_one_axis_are_enough(
     trainer: pd.DataFrame, columns: tuple[str, ...], model: str, known: dict[str, float]
 ) -> None:
-    [answer] = host.identify(trainer[list(columns)], models=model).linear
+    [answer] = host.identify(flown_on(trainer, model)[list(columns)], models=model).linear
     true, half = derivatives(answer.trim.airspeed_mps), answer.result.half_width()
     for name, share in known.items():
         width = half[answer.result.index(name)]
@@ -304,7 +310,8 @@ def test_columns_of_one_axis_are_enough(
 def test_lateral_motion_needs_no_accelerometers() -> None:
     """What airspeed does stayed in: L_da 6.1 % off, known to 3.0, under trust."""
     measured, _ = fly(Air("karman", 0.5, turns=False), 24410)
-    table = pd.DataFrame(measured).drop(columns=["ax_mps2", "ay_mps2", "az_mps2"])
+    forces = ["ax_mps2", "ay_mps2", "az_mps2"]
+    table = flown_on(pd.DataFrame(measured), "lateral").drop(columns=forces)
     [answer] = host.identify(table, models="lateral").linear
     true, half = derivatives(answer.trim.airspeed_mps), answer.result.half_width()
     for name in ("L_beta", "L_p", "L_da", "N_beta", "N_dr"):
@@ -315,7 +322,8 @@ def test_lateral_motion_needs_no_accelerometers() -> None:
 
 def test_a_side_force_of_doubtful_unit_is_in_no_linear_fit(trainer: pd.DataFrame) -> None:
     """In g it put L_r of a light aircraft 10 to 16 % off, under trust."""
-    table = trainer.assign(ay_mps2=trainer["ay_mps2"] / GRAVITY_MPS2)
+    table = flown_on(trainer, "lateral")
+    table = table.assign(ay_mps2=table["ay_mps2"] / GRAVITY_MPS2)
     [answer] = host.identify(table, models="lateral").linear
     assert "ay_mps2" not in answer.result.model.outputs
     assert any("ay_mps2 has an open finding" in w for w in answer.result.warnings)
