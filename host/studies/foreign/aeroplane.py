@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from host.constants import GRAVITY_MPS2
@@ -94,8 +94,7 @@ def thrust_n(throttle: float, airspeed_mps: Speed) -> Speed:
     return TRAINER.static_thrust * throttle * (1.0 - airspeed_mps / TRAINER.pitch_speed)
 
 
-@dataclass(frozen=True)
-class Motion:
+class Motion(NamedTuple):
     """Rates of all states at one instant, and what is measured."""
 
     rates: tuple[float, ...]
@@ -131,16 +130,17 @@ def motion(
         The air pitches, yaws and rolls (MIL-F-8785C, 3.7.5); else gusts act on a point.
     """
     a = TRAINER
-    u, v, w, p, q, r, phi, theta, psi, way, _, *tail, de, da, dr = x
+    u, v, w, p, q, r, phi, theta, psi, way, _, tail_u, tail_v, tail_w, de, da, dr = x
     cf, sf, ct, st = math.cos(phi), math.sin(phi), math.cos(theta), math.sin(theta)
-    gust = (at(air.u, way), at(air.v, way), at(air.w, way))
+    gu, gv, gw = at(air.u, way), at(air.v, way), at(air.w, way)
     reach = 4.0 * a.span / math.pi
     p_air = at(air.p, way) if spread else 0.0
-    along, side, down = (now - before for now, before in zip(gust, tail, strict=True))
-    gu, gv, gw = gust
+    changes = (gu - tail_u, gv - tail_v, gw - tail_w)
+    _, side, down = changes
     if not turns:  # the air turns about the aircraft's axes, wherever it heads
-        gu, gv, gw = _to_body(gust, phi, theta, psi)
-        _, side, down = _to_body((along, side, down), phi, theta, psi)
+        headed = cf, sf, ct, st, math.cos(psi), math.sin(psi)
+        gu, gv, gw = _to_body((gu, gv, gw), headed)
+        _, side, down = _to_body(changes, headed)
     q_air, r_air = (down / reach, -side / reach) if spread else (0.0, 0.0)
     ua, va, wa = u - gu, v - gv, w - gw
     V = math.sqrt(ua * ua + va * va + wa * wa)
@@ -183,21 +183,26 @@ def motion(
         turning / ct,
         V,
         u * st - v * sf * ct - w * cf * ct,
-        *((now - before) * V / reach for now, before in zip(gust, tail, strict=True)),
-        *(
-            max(-SERVO_LIMIT_RADPS, min(SERVO_LIMIT_RADPS, SERVO_RADPS * (wanted - at_now)))
-            for wanted, at_now in zip(command, (de, da, dr), strict=True)
-        ),
+        changes[0] * V / reach,
+        changes[1] * V / reach,
+        changes[2] * V / reach,
+        _servo_rate(command[0] - de),
+        _servo_rate(command[1] - da),
+        _servo_rate(command[2] - dr),
     )
     return Motion(rates, V, alpha, beta, (ax, ay, az))
 
 
+def _servo_rate(error_rad: float) -> float:
+    return max(-SERVO_LIMIT_RADPS, min(SERVO_LIMIT_RADPS, SERVO_RADPS * error_rad))
+
+
 def _to_body(
-    earth: tuple[float, float, float], phi: float, theta: float, psi: float
+    earth: tuple[float, float, float], headed: tuple[float, float, float, float, float, float]
 ) -> tuple[float, float, float]:
+    """Return a vector of earth axes in body axes, by cosine and sine of each angle."""
     north, east, down = earth
-    cf, sf, ct, st = math.cos(phi), math.sin(phi), math.cos(theta), math.sin(theta)
-    cp, sp = math.cos(psi), math.sin(psi)
+    cf, sf, ct, st, cp, sp = headed
     return (
         ct * cp * north + ct * sp * east - st * down,
         (sf * st * cp - cf * sp) * north + (sf * st * sp + cf * cp) * east + sf * ct * down,

@@ -77,6 +77,7 @@ def _flown(air: Air, gusts_met: Gusts) -> dict[str, NDArray[np.float64]]:
     x = [SPEED_MPS * np.cos(alpha), 0.0, SPEED_MPS * np.sin(alpha), *[0.0] * 4, alpha, 0.0, 0.0]
     x = [float(value) for value in (*x, HEIGHT_M, *[0.0] * 3, de, 0.0, 0.0)]
     step = STEP_S / SUBSTEPS
+    half, sixth = 0.5 * step, step / 6.0
     rows = []
     for sample in range(round(DURATION_S / STEP_S)):
         t = sample * STEP_S
@@ -91,11 +92,11 @@ def _flown(air: Air, gusts_met: Gusts) -> dict[str, NDArray[np.float64]]:
         rows.append((t, now.airspeed, now.alpha, now.beta, *x[3:9], *now.force, *x[14:17], x[10]))
         for substep in range(SUBSTEPS):
             a = rates(x) if substep else now.rates
-            b = rates([s + 0.5 * step * k for s, k in zip(x, a, strict=True)])
-            c = rates([s + 0.5 * step * k for s, k in zip(x, b, strict=True)])
+            b = rates([s + half * k for s, k in zip(x, a, strict=True)])
+            c = rates([s + half * k for s, k in zip(x, b, strict=True)])
             d = rates([s + step * k for s, k in zip(x, c, strict=True)])
             x = [
-                s + step / 6.0 * (ka + 2.0 * kb + 2.0 * kc + kd)
+                s + sixth * (ka + 2.0 * kb + 2.0 * kc + kd)
                 for s, ka, kb, kc, kd in zip(x, a, b, c, d, strict=True)
             ]
     return dict(zip(COLUMNS, np.array(rows).T, strict=True))

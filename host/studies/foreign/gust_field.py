@@ -83,7 +83,7 @@ def at(field: NDArray[np.float64] | list[float], way_m: float) -> float:
     f = x - i
     a, b, c, d = field[i - 1], field[i], field[i + 1], field[i + 2]
     bend = 2.0 * a - 5.0 * b + 4.0 * c - d + f * (3.0 * (b - c) + d - a)
-    return float(b + 0.5 * f * (c - a + f * bend))
+    return b + 0.5 * f * (c - a + f * bend)
 
 
 def _along(wave: NDArray[np.float64], sd: float, scale_m: float, form: str) -> NDArray[np.float64]:
