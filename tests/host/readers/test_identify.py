@@ -16,34 +16,13 @@ from host.sysid.flight import read_flight_columns
 from host.sysid.pipeline import aircraft_data
 from host.sysid.pipeline.surface_travel import with_surface_angles
 from host.twin.outcome import ardupilot_log
-from host.twin.outcome.truth_files import maneuvers
 from host.twin.sensors.autopilot_sensors import DLPF
 from host.twin.sensors.sensor_delays import FILTERS
 
 import host
-from tests.host.readers.autopilot_flights import FORMATS, flown, write
+from tests.host.readers.autopilot_flights import FORMATS, write
 
 AIRCRAFT = "ultrastick25e"
-
-
-def test_a_short_period_without_vanes_holds_the_truth(tmp_path: Path) -> None:
-    true = maneuvers(*flown())[0]["derivatives"]
-    assert isinstance(true, dict)
-    found = host.identify(write("ulog", tmp_path), aircraft=AIRCRAFT)
-    table = found.table.loc["short-period"]
-    for name in ("CL_alpha", "Cm_alpha", "Cm_q", "Cm_de"):
-        row = table.loc[name]
-        assert abs(row["value"] - true[name]) < row["half_width"], name
-        assert row["half_width"] < 0.4 * abs(true[name]), name
-    # The path is reconstructed: the interval alone says how far each may be trusted.
-    for _, row in found.table.iterrows():
-        if row["verdict"] == "trust":
-            assert row["half_width"] < 0.1 * abs(row["value"])
-    text = found.to_text()
-    assert "without vanes longitudinal" in text
-    assert "finding flow-angles" in text
-    assert "with GPS, without vanes:" in text
-    assert "angles of attack and sideslip are reconstructed" in text
 
 
 def test_without_gps_no_angle_is_trusted(tmp_path: Path) -> None:

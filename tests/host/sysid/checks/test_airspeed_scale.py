@@ -35,9 +35,9 @@ def faster(times: float, columns: Columns) -> Columns:
     return {**columns, "airspeed_mps": times * columns["airspeed_mps"]}
 
 
-@pytest.mark.parametrize(("seed", "times"), [(SEED, 0.9), (SEED + 1, 1.1)])
-def test_calm_air_tells_the_scale(claimed: SensorErrorModel, seed: int, times: float) -> None:
-    columns = measured(CALM, seed, times)
+@pytest.mark.parametrize("times", [0.9, 1.1])
+def test_calm_air_tells_the_scale(claimed: SensorErrorModel, times: float) -> None:
+    columns = measured(CALM, SEED, times)
     found = airspeed_scale(columns, claimed)
     assert found is not None
     assert found.factor == pytest.approx(times, abs=0.03)
@@ -48,9 +48,8 @@ def test_calm_air_tells_the_scale(claimed: SensorErrorModel, seed: int, times: f
 
 
 @pytest.mark.parametrize("air", [CALM, GUSTY], ids=["calm", "gusts of 1 m/s"])
-@pytest.mark.parametrize("seed", range(SEED, SEED + 2))
-def test_a_right_airspeed_is_not_accused(claimed: SensorErrorModel, air: Air, seed: int) -> None:
-    columns = measured(air, seed, 1.0)
+def test_a_right_airspeed_is_not_accused(claimed: SensorErrorModel, air: Air) -> None:
+    columns = measured(air, SEED, 1.0)
     found = airspeed_scale(columns, claimed)
     assert found is not None
     assert found.excess < 9.0  # three deviations

@@ -51,7 +51,7 @@ def _noise(rng: np.random.Generator, together: float) -> Array:
     return np.array(made)[:, 200:]
 
 
-@pytest.mark.parametrize("together", [-0.9, 0.0, 0.9])
+@pytest.mark.parametrize("together", [-0.9, 0.9])
 def test_variance_is_that_of_draws(together: float) -> None:
     """A gust that moves both outputs counts between them: without, +-0.9 are as none."""
     rng = np.random.default_rng(11)
