@@ -273,4 +273,43 @@ TEST_CASE("every step, through a minute of random motion, is what the equations 
   CHECK(apart <= 10);
 }
 
+TEST_CASE("left and right, up and down are alike: mirrored forces give mirrored angles") {
+  for (int16_t push = 1; push <= 60; ++push) {
+    for (uint8_t axis = 0; axis < 2; ++axis) {
+      int16_t angle_cdeg[2] = {};
+      for (uint8_t side = 0; side < 2; ++side) {
+        Attitude attitude{AttitudeSettings{}};
+        AttitudeInput in;
+        in.force[axis] = static_cast<int16_t>(side == 0 ? push : -push);
+        in.force[2] = -8192;
+        for (uint16_t at = 0; at < 1600; ++at) {
+          attitude.step(in, 5000);
+          attitude.catch_up();
+        }
+        angle_cdeg[side] = axis == 0 ? attitude.theta_cdeg() : attitude.phi_cdeg();
+      }
+      REQUIRE(angle_cdeg[0] == -angle_cdeg[1]);
+      // A slope is its angle: 8192 LSB a g.
+      const double slope_cdeg = (axis == 0 ? 100.0 : -100.0) * atan(push / 8192.0) / kRadPerDeg;
+      REQUIRE(fabs(angle_cdeg[0] - slope_cdeg) < 1.1);
+    }
+  }
+}
+
+TEST_CASE("a heading error counts for half a second of samples, to the microsecond") {
+  for (uint32_t less_us = 0; less_us < 2; ++less_us) {
+    Attitude attitude{AttitudeSettings{}};
+    AttitudeInput in;
+    in.force[2] = -8192;
+    const int16_t field[3] = {400, 30, 200};
+    attitude.set_field(field);
+    for (uint8_t at = 0; at < 100; ++at) {
+      CHECK(attitude.heading_valid());
+      attitude.step(in, at == 9 ? 5000 - less_us : 5000);
+      attitude.catch_up();
+    }
+    CHECK_EQ(attitude.heading_valid(), less_us != 0);
+  }
+}
+
 #endif
