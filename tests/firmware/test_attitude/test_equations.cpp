@@ -278,7 +278,8 @@ TEST_CASE("left and right, up and down are alike: mirrored forces give mirrored 
     for (uint8_t axis = 0; axis < 2; ++axis) {
       int16_t angle_cdeg[2] = {};
       for (uint8_t side = 0; side < 2; ++side) {
-        Attitude attitude{AttitudeSettings{}};
+        const AttitudeSettings settings;
+        Attitude attitude(settings);
         AttitudeInput in;
         in.force[axis] = static_cast<int16_t>(side == 0 ? push : -push);
         in.force[2] = -8192;
@@ -298,7 +299,8 @@ TEST_CASE("left and right, up and down are alike: mirrored forces give mirrored 
 
 TEST_CASE("a heading error counts for half a second of samples, to the microsecond") {
   for (uint32_t less_us = 0; less_us < 2; ++less_us) {
-    Attitude attitude{AttitudeSettings{}};
+    const AttitudeSettings settings;
+    Attitude attitude(settings);
     AttitudeInput in;
     in.force[2] = -8192;
     const int16_t field[3] = {400, 30, 200};

@@ -297,3 +297,21 @@ TEST_CASE("a card pulled out answers nothing, and no call hangs") {
   }
   CHECK(!bench.read(0, sector_buffer));
 }
+
+TEST_CASE("the numbers by which the log tells what a card did wrong") {
+  const CardStatus by_number[] = {CardStatus::kOk,
+                                  CardStatus::kNoCard,
+                                  CardStatus::kVoltage,
+                                  CardStatus::kInitTimeout,
+                                  CardStatus::kCommand,
+                                  CardStatus::kReadToken,
+                                  CardStatus::kReadCrc,
+                                  CardStatus::kWriteCrc,
+                                  CardStatus::kWriteError,
+                                  CardStatus::kNoResponse,
+                                  CardStatus::kTimeout,
+                                  CardStatus::kUnsupported};
+  for (uint8_t number = 0; number < 12; ++number) {
+    CHECK_EQ(static_cast<uint8_t>(by_number[number]), number);
+  }
+}
