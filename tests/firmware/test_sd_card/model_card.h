@@ -16,14 +16,19 @@ class ModelCard {
   bool version_2 = true;
   bool high_capacity = true;
   bool wrong_voltage = false;
-  uint16_t negotiations = 3;  // ACMD41 answers idle this often
-  uint8_t gap_bytes = 2;      // before a block to the host
-  uint16_t busy_bytes = 5;    // after each block; 0xFFFF: for ever
-  uint32_t base = 0;          // first sector kept
-  int16_t flip_byte = -1;     // of the next data block from the host, on the wire
-  bool write_error = false;   // on the next block
-  bool flip_read = false;     // a byte of the next block to the host
-  bool error_token = false;   // instead of the next block to the host
+  uint16_t negotiations = 3;     // ACMD41 answers idle this often
+  uint8_t gap_bytes = 2;         // before a block to the host
+  uint16_t busy_bytes = 5;       // after each block; 0xFFFF: for ever
+  uint32_t base = 0;             // first sector kept
+  int16_t flip_byte = -1;        // of the next data block from the host, on the wire
+  bool write_error = false;      // on the next block
+  bool flip_read = false;        // a byte of the next block to the host
+  bool error_token = false;      // instead of the next block to the host
+  uint8_t refuses = 0xFF;        // the command with this index is answered with an error
+  uint8_t silent = 0xFF;         // behind this one no block comes
+  uint8_t echo = 0xAA;           // the last byte of CMD8's answer
+  uint8_t volts = 1;             // and the one before it
+  const uint8_t* csd = nullptr;  // instead of the model's own
 
   // ---- what a test looks at ----
   uint8_t store[kSectors][512] = {};
@@ -138,7 +143,7 @@ class ModelCard {
   void send_block(const uint8_t* from, uint16_t size) {
     source_ = from;
     source_size_ = size;
-    sending_ = static_cast<uint16_t>(size + 3 + gap_bytes);
+    sending_ = silent_ ? uint16_t{0} : static_cast<uint16_t>(size + 3 + gap_bytes);
   }
 
   void take(uint8_t out) {
@@ -187,6 +192,11 @@ class ModelCard {
     application_ = false;
     queue(0xFF);
     const uint8_t r1 = idle_ ? 1 : 0;
+    if (index == refuses) {
+      queue(static_cast<uint8_t>(r1 | 0x20));
+      return;
+    }
+    silent_ = index == silent;
     switch (index) {
       case 0:
         idle_ = true;
@@ -197,8 +207,8 @@ class ModelCard {
         if (version_2) {
           queue(0);
           queue(0);
-          queue(wrong_voltage ? 0 : 1);
-          queue(static_cast<uint8_t>(argument));
+          queue(wrong_voltage ? 0 : volts);
+          queue(argument == 0x1AA ? echo : uint8_t{0});
         }
         return;
       case 9:
@@ -275,6 +285,10 @@ class ModelCard {
   // 2 GB with blocks of 1024 bytes (version 1), or 8 GB (version 2).
   void make_csd() {
     memset(csd_, 0, sizeof(csd_));
+    if (csd != nullptr) {
+      memcpy(csd_, csd, sizeof(csd_));
+      return;
+    }
     if (high_capacity) {
       csd_[0] = 0x40;
       csd_[8] = 0x3B;
@@ -361,4 +375,5 @@ class ModelCard {
   bool idle_ = true;
   bool application_ = false;
   bool many_ = false;
+  bool silent_ = false;
 };
