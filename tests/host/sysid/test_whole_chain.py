@@ -8,20 +8,17 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
+from host.aircraft.mass_properties import AirframeData, Condition
 from host.cli import main
 from host.errors import IdentificationError
 from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics import coefficient_parts, coefficients
 from host.sysid.flight import read_columns
-from host.sysid.linear import Answer
 from host.sysid.maneuvers import detect_maneuvers, grade
 from host.sysid.models import Trim, read_model
 from host.sysid.models.templates import longitudinal
 from host.sysid.numerics import OutputProblem
 from host.sysid.reconstruction.position_correction import transfer_to_cg
-
-from tests.host.sysid.at_hand import identify
 
 
 @pytest.fixture(scope="module")
@@ -78,44 +75,6 @@ def test_a_sweep_is_found_from_its_first_slow_swing() -> None:
     assert [f.kind for f in found] == ["sweep"]
     assert found[0].start_s == pytest.approx(8.0, abs=0.6)
     assert found[0].input_end_s == pytest.approx(33.0, abs=0.3)
-
-
-@pytest.fixture(scope="module")
-def answers(flown: tuple[Path, dict[str, Any]]) -> dict[str, Answer]:
-    """Light turbulence, every tolerance drawn, nominal mass properties."""
-    columns, _ = read_columns(flown[0])
-    return {a.template: a for a in identify(columns, airframe=airframe_data("ultrastick25e"))}
-
-
-def test_main_derivatives_and_modes_are_near_the_truth(
-    flown: tuple[Path, dict[str, Any]], answers: dict[str, Answer]
-) -> None:
-    truth = flown[1]["maneuver"]
-    assert isinstance(truth, list)
-    for template, axis, names in (
-        ("longitudinal", ("elevator",), ("CL_alpha", "Cm_alpha", "Cm_de")),
-        ("lateral", ("aileron", "rudder"), ("Cl_p", "Cl_da", "Cn_beta", "Cn_r", "Cn_dr")),
-    ):
-        flights = [m["derivatives"] for m in truth if m["axes"][0] in axis]
-        found = {c.name: c for c in answers[template].coefficients}
-        for name in names:
-            expected = float(np.mean([f[name] for f in flights]))
-            assert found[name].value == pytest.approx(expected, rel=0.25), name
-            assert found[name].half_width > 0.0
-    dutch = next(m for m in answers["lateral"].modes if m.name == "dutch roll")
-    sides = [m["modes"]["dutch_roll"][0] for m in truth if m["axes"][0] in ("aileron", "rudder")]
-    assert dutch.frequency_radps == pytest.approx(float(np.mean(sides)), rel=0.05)
-    assert answers["lateral"].held_out
-
-
-def test_unseen_maneuvers_are_predicted(answers: dict[str, Answer]) -> None:
-    for answer in answers.values():
-        fitted = {f.name: f.nrmse for f in answer.fits}
-        unseen = {f.name: f.nrmse for f in answer.validation}
-        assert set(unseen) == set(fitted) == set(answer.model.outputs)
-        assert max(fitted.values()) < 0.5
-        # Airspeed drifts with the gusts of the day; the fast motions are told.
-        assert max(v for name, v in unseen.items() if name != "airspeed_mps") < 0.5
 
 
 def test_vane_and_accelerometer_are_moved_to_the_cg() -> None:
@@ -225,16 +184,17 @@ def test_verbs_answer_and_fail_in_one_line(
     assert main(["maneuvers", source, "--json"]) == 0
     assert len(json.loads(capsys.readouterr().out)["maneuvers"]) == 10
     saved, mat = tmp_path / "model.toml", tmp_path / "model.mat"
+    quick = ["--method", "output-error-white"]
     options = ["--model", "short-period", "--save-model", str(saved), "--mat", str(mat), "--json"]
-    assert main(["identify", source, *options]) == 0
+    assert main(["identify", source, *options, *quick]) == 0
     answer = json.loads(capsys.readouterr().out)["answers"][0]
     assert answer["parameters"]["M_alpha"]["value"] == pytest.approx(-280.0, rel=0.25)
     assert read_model(saved).name == "short-period"
     assert mat.exists()
-    assert main(["identify", source, "--model", "roll"]) == 0
-    assert "trust" in capsys.readouterr().out
+    assert main(["identify", source, "--model", "roll", *quick]) == 0
+    assert "Known from this flight: roll " in capsys.readouterr().out
     truth = str(flown[0].with_name("flight.truth.toml"))
-    known = ["--aircraft", "ultrastick25e", "--truth", truth, "--model", "short-period"]
+    known = ["--aircraft", "ultrastick25e", "--truth", truth, "--model", "short-period", *quick]
     assert main(["identify", source, *known]) == 0
     assert "intervals hold the truth" in capsys.readouterr().out
     for wrong in (
