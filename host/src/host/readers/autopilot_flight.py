@@ -125,11 +125,16 @@ class AutopilotFlight:
         }
         if not own:
             return {}
-        t_s = np.unique(np.concatenate([t for t, _ in own.values()]))
+        # Channels of one message have the same instants.
+        instants = {id(t): t for t, _ in own.values()}
+        t_s = np.unique(np.concatenate(list(instants.values())))
         result = {"t_s": t_s}
+        before, rows = None, np.zeros(0, dtype=np.intp)
         for name, (t, values) in own.items():
+            if t is not before:
+                before, rows = t, np.searchsorted(t_s, t)
             column = np.full(len(t_s), np.nan)
-            column[np.searchsorted(t_s, t)] = values
+            column[rows] = values
             result[f"{name}_share" if name in SURFACES else name] = column
         return result
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from host.physical.recording import AUTOPILOT, SURFACES, Recording
@@ -28,15 +29,18 @@ def autopilot_table(
     """
     read = read_autopilot(source, sensors, flight)
     read.refuse()
+    notes, shares = read.notes(), read.shares
+    tuned = tuned_models(read.log, read.channels.signals, torque_setpoints(read.log))
+    # What is read of the messages is in the channels; of a large log both are too much.
+    read = replace(read, log=replace(read.log, messages={}))
     columns = read.columns()
-    shares = read.shares
     columns |= {f"{name}_rad": columns[f"{name}_share"] for name in shares}
     commanded = tuple(name for name in SURFACES if name in shares)
     return Foreign(
         columns,
-        notes=read.notes(),
+        notes=notes,
         recording=Recording(commanded, CLOCK_SHARE, AUTOPILOT, read.imu_lag_s),
         shares=shares,
         slow_outputs=read.undersampled(),
-        tuned=tuned_models(read.log, read.channels.signals, torque_setpoints(read.log)),
+        tuned=tuned,
     )

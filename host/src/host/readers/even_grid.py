@@ -169,6 +169,8 @@ def _grid(rows: _Instants, dt_s: float, notes: list[str]) -> Array:
 def even_grid(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
     """Bring the table to an even grid, unwrap angles once, draw curves between slow samples and
     lines over gaps.
+
+    The table is emptied meanwhile: hours of a log are in memory once.
     """
     index = rows_in_order(columns["t_s"], notes)
     if not np.array_equal(index, np.arange(len(columns["t_s"]))):
@@ -183,10 +185,8 @@ def even_grid(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
     longest_step_s = float(rows.gaps.max())
     missing: list[tuple[float, float, str]] = []
     slower: list[str] = []
-    for name, values in columns.items():
-        if name == "t_s":
-            continue
-        own = instants[name]
+    for name in [name for name in columns if name != "t_s"]:
+        values, own = columns.pop(name), instants[name]
         covered = _covered(own, recorded_s)
         if covered < 0.5:
             notes.append(f"{name}: {100.0 * (1.0 - covered):.0f} % missing, not used")

@@ -153,6 +153,7 @@ def read_flight_columns(
         return FlightColumns(columns, notes, found.recording, found.calibration)
     from host.sysid.flight.table_columns import table_columns  # checks that our log needs not
 
+    found.columns = raw = {}  # what is used of them is known
     columns, findings, resolution = table_columns(used, found, source, called, accept)
     return FlightColumns(
         columns | derived_columns(columns, wanted),

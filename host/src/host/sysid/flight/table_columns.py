@@ -29,8 +29,8 @@ def table_columns(
 
     Parameters
     ----------
-    used : mapping of Array
-        Columns by our names, as they were read.
+    used : dict of Array
+        Columns by our names, as they were read; emptied.
     found : Foreign
         What was read; what is done is noted in it.
     source : Path or DataFrame
@@ -43,6 +43,7 @@ def table_columns(
     if not found.shares:  # a table: an autopilot's log is read clock by clock
         used = _timed(used, source, called, found.notes, timing, accept)
     seen = _measured(used, found.notes, accept)
+    used.clear()
     even = even_grid(seen.columns, found.notes)
     columns, findings = checked(even, accept)
     slow = _slow_outputs(found.slow_outputs)
