@@ -17,6 +17,7 @@ import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.numerics.ar_noise import ArNoise, fit_ar, lagged_moments
+from host.sysid.numerics.response import Response
 from host.sysid.reconstruction.flight_path import (
     AIR,
     DELAY_DIFFERENCE,
@@ -93,24 +94,20 @@ def fit_path(problem: PathProblem, lagged_inputs: Sequence[Array]) -> PathFit:
 def _search(problem: PathProblem, lagged_inputs: Sequence[Array], patience: int) -> PathFit:
     """Iterate to convergence, the first `patience` times with air data held to the prior."""
     theta = problem.prior_mean.copy()
-    outputs = problem.model.outputs
-    noise = [ArNoise.white() for _ in outputs]
+    noise = [ArNoise.white() for _ in problem.model.outputs]
     instruments: dict[int, list[Array]] = {}
-    air_unknowns = [k for k, name in enumerate(problem.names) if name in AIR_ERRORS]
+    air = np.isin(problem.names, AIR_ERRORS)
     converged, near = False, False
     length, longest, last = 1.0, 1.0, np.zeros(len(theta))
-    sizes, without_vanes = [np.inf, np.inf], not lagged_inputs[0].shape[1]
+    sizes, shrinks = [np.inf, np.inf], np.inf if lagged_inputs[0].shape[1] else SHRINKS
     iteration = 0
     origin, least_cost, halvings = theta, np.inf, 0
     constrained, adapt_from = bool(patience), max(patience, ADAPT_FROM)
     while True:
-        responses = problem.respond(theta)
-        if responses is None:
-            raise IdentificationError("data compatibility: the flight path is not finite")
-        residuals = [problem.measured(k) - r.y for k, r in enumerate(responses)]
+        responses, residuals = _residuals(problem, theta)
         precision = problem.prior_precision.copy()
         if constrained:
-            precision[air_unknowns] *= AIR_PRIOR_WEIGHT
+            precision[air] *= AIR_PRIOR_WEIGHT
             cost = _negative_log_likelihood(problem, residuals, theta, precision)
             if cost > least_cost and halvings < HALVINGS:
                 theta, halvings = 0.5 * (theta + origin), halvings + 1
@@ -120,58 +117,131 @@ def _search(problem: PathProblem, lagged_inputs: Sequence[Array], patience: int)
             precision = problem.prior_precision
             constrained, adapt_from = False, max(iteration, ADAPT_FROM)
         adapting = adapt_from <= iteration < adapt_from + ADAPTING_ITERATIONS
-        # Of every segment, one array per output.
-        whitened: list[list[Array]] = [[] for _ in responses]
-        instrument_blocks: list[list[Array]] = [[] for _ in responses]
-        slopes: list[list[Array]] = [[] for _ in responses]
-        for j, name in enumerate(outputs):
-            if adapting and name not in GPS:
-                noise[j] = _fit_ar_noise([r[j] for r in residuals])
-            white = [noise[j].whiten(r[j][:, None])[:, 0] for r in residuals]
-            slope = [noise[j].whiten(r.sensitivities[j]) for r in responses]
-            variance = float(np.sum(np.concatenate(white) ** 2)) / problem.counted(name)
-            deviation = np.sqrt(max(variance, 1e-300))
-            if adapting and name in AIR:
-                instruments[j] = _instruments(problem, slope, lagged_inputs, noise[j])
-            for k, parts in enumerate(zip(white, instruments.get(j, slope), slope, strict=True)):
-                for into, part in zip((whitened, instrument_blocks, slopes), parts, strict=True):
-                    into[k].append(part / deviation)
-        H = np.diag(precision)
-        g = precision * (problem.prior_mean - theta)
-        for k, rows in enumerate(zip(whitened, instrument_blocks, slopes, strict=True)):
-            e, Z, J = map(np.concatenate, rows)
-            own = problem.columns(k)
-            H[np.ix_(own, own)] += Z.T @ J
-            g[own] += Z.T @ e
-        size = np.sqrt(np.maximum(np.abs(np.diag(H)), 1e-300))
-        try:
-            inverse = np.linalg.inv(H / np.outer(size, size)) / np.outer(size, size)
-        except np.linalg.LinAlgError as error:
-            raise IdentificationError("data compatibility: singular equations") from error
+        adapted_to = None
+        if adapting:
+            noise, adapted_to = _fit_ar_noises(problem, residuals), lagged_inputs
+        rows = _rows(problem, responses, residuals, noise, instruments, adapted_to)
+        inverse, g = _solved(problem, theta, precision, rows)
         if converged or iteration == MOST_ITERATIONS + patience:
-            B = np.diag(problem.prior_precision)
-            for k, own_instruments in enumerate(instrument_blocks):
-                own, Z = problem.columns(k), np.concatenate(own_instruments)
-                B[np.ix_(own, own)] += Z.T @ Z
-            covariance = inverse @ B @ inverse.T
-            both = 0.5 * (covariance + covariance.T)
-            return PathFit(theta, both, residuals, iteration, converged)
+            covariance = _covariance(problem, inverse, rows)
+            return PathFit(theta, covariance, residuals, iteration, converged)
         step = inverse @ g
-        with np.errstate(divide="ignore"):
-            most = LARGEST_STEP / np.sqrt(problem.prior_precision)
         error_size = np.sqrt(np.maximum(np.abs(np.diag(inverse)), 1e-300))
         largest = float(np.max(np.abs(step) / error_size))
-        if iteration > adapt_from + ADAPTING_ITERATIONS:
-            length = min(_length(length, last, step / error_size), longest)
-        if without_vanes and iteration > adapt_from + 2 and largest > SHRINKS * sizes[-2]:
-            longest = max(SHORTER * longest, SHORTEST)
-            length = min(length, longest)
         sizes.append(largest)
-        last = step / error_size
-        theta = theta + length * np.clip(step, -most, most)
+        now, since = step / error_size, iteration - adapt_from
+        length, longest = _lengths((length, longest), (last, now), since, sizes, shrinks)
+        last = now
+        theta = theta + length * _limited(step, problem.prior_precision)
         iteration += 1
         near = largest < PLAIN_STEP_LIMIT
         converged = largest < STEP_LIMIT and not constrained and iteration > adapt_from + 1
+
+
+def _residuals(problem: PathProblem, theta: Array) -> tuple[list[Response], list[Array]]:
+    """Return responses and residuals of every segment; refuse a path that is not finite."""
+    responses = problem.respond(theta)
+    if responses is None:
+        raise IdentificationError("data compatibility: the flight path is not finite")
+    return responses, [problem.measured(k) - r.y for k, r in enumerate(responses)]
+
+
+def _rows(
+    problem: PathProblem,
+    responses: Sequence[Response],
+    residuals: Sequence[Array],
+    noise: Sequence[ArNoise],
+    instruments: dict[int, list[Array]],
+    adapted_to: Sequence[Array] | None,
+) -> list[tuple[Array, Array, Array]]:
+    """Return whitened residuals, instruments and sensitivities of every segment.
+
+    `instruments` are those of the outputs of air data; made anew of inputs `adapted_to`, if given.
+    """
+    parts: list[tuple[list[Array], list[Array], list[Array]]] = [([], [], []) for _ in responses]
+    for j, name in enumerate(problem.model.outputs):
+        white = [noise[j].whiten(r[j][:, None])[:, 0] for r in residuals]
+        slope = [noise[j].whiten(r.sensitivities[j]) for r in responses]
+        variance = float(np.sum(np.concatenate(white) ** 2)) / problem.counted(name)
+        deviation = np.sqrt(max(variance, 1e-300))
+        if adapted_to is not None and name in AIR:
+            instruments[j] = _instruments(problem, slope, adapted_to, noise[j])
+        for into, of_segment in zip(
+            parts, zip(white, instruments.get(j, slope), slope, strict=True), strict=True
+        ):
+            for one, part in zip(into, of_segment, strict=True):
+                one.append(part / deviation)
+    return [(np.concatenate(e), np.concatenate(Z), np.concatenate(J)) for e, Z, J in parts]
+
+
+def _solved(
+    problem: PathProblem,
+    theta: Array,
+    precision: Array,
+    rows: Sequence[tuple[Array, Array, Array]],
+) -> tuple[Array, Array]:
+    """Return the inverse of H = Z'J + P0^-1, and the right side; refuse singular equations."""
+    H = np.diag(precision)
+    g = precision * (problem.prior_mean - theta)
+    for k, (e, Z, J) in enumerate(rows):
+        own = problem.columns(k)
+        H[np.ix_(own, own)] += Z.T @ J
+        g[own] += Z.T @ e
+    size = np.sqrt(np.maximum(np.abs(np.diag(H)), 1e-300))
+    try:
+        return np.linalg.inv(H / np.outer(size, size)) / np.outer(size, size), g
+    except np.linalg.LinAlgError as error:
+        raise IdentificationError("data compatibility: singular equations") from error
+
+
+def _covariance(
+    problem: PathProblem, inverse: Array, rows: Sequence[tuple[Array, Array, Array]]
+) -> Array:
+    """Return H^-1 (Z'Z + P0^-1) H^-T."""
+    B = np.diag(problem.prior_precision)
+    for k, (_, Z, _) in enumerate(rows):
+        own = problem.columns(k)
+        B[np.ix_(own, own)] += Z.T @ Z
+    covariance = inverse @ B @ inverse.T
+    return np.asarray(0.5 * (covariance + covariance.T))
+
+
+def _limited(step: Array, prior_precision: Array) -> Array:
+    """Return a step that is no longer than priors let it be."""
+    with np.errstate(divide="ignore"):
+        most = LARGEST_STEP / np.sqrt(prior_precision)
+    return np.asarray(np.clip(step, -most, most))
+
+
+def _lengths(
+    lengths: tuple[float, float],
+    steps: tuple[Array, Array],
+    since: int,
+    sizes: Sequence[float],
+    shrinks: float,
+) -> tuple[float, float]:
+    """Return the length of a step and the longest, from those of the last.
+
+    Parameters
+    ----------
+    lengths : tuple of float
+        The last length, and the longest.
+    steps : tuple of Array
+        The last step and this one, in standard errors.
+    since : int
+        Iterations since AR models and instruments are adapted.
+    sizes : sequence of float
+        Largest component of all steps, this one included.
+    shrinks : float
+        Share of the size before the last that a step may have.
+    """
+    length, longest = lengths
+    if since > ADAPTING_ITERATIONS:
+        length = min(_length(length, *steps), longest)
+    if since > 2 and sizes[-1] > shrinks * sizes[-3]:
+        longest = max(SHORTER * longest, SHORTEST)
+        length = min(length, longest)
+    return length, longest
 
 
 def _length(length: float, last: Array, step: Array) -> float:
@@ -188,6 +258,14 @@ def _negative_log_likelihood(
     counts = np.array([problem.counted(name) for name in problem.model.outputs])
     off = theta - problem.prior_mean
     return float(counts @ np.log(np.maximum(squares, 1e-300)) + off**2 @ precision)
+
+
+def _fit_ar_noises(problem: PathProblem, residuals: Sequence[Array]) -> list[ArNoise]:
+    """Return the memory of each output's residuals; fixes of GPS have none."""
+    return [
+        ArNoise.white() if name in GPS else _fit_ar_noise([r[j] for r in residuals])
+        for j, name in enumerate(problem.model.outputs)
+    ]
 
 
 def _fit_ar_noise(residuals: Sequence[Array]) -> ArNoise:

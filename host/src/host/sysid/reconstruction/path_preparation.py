@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -46,6 +46,7 @@ SEGMENT_S = 12.0
 SHORT_SEGMENT_S = 6.0  # without GPS nothing holds the path for longer
 # Without GPS a tilt of the IMU, a bias of an accelerometer and the attitude look alike.
 WITHOUT_GPS = (*INERTIAL[0:3], *FLOW, *DELAYS, DELAY_DIFFERENCE)
+IMU = (*(f"{a}_radps" for a in "pqr"), *(f"a{a}_mps2" for a in "xyz"))
 MOST_SEGMENTS = 8
 LEAST_EXCITATION = 0.1  # of the most excited segment: initial value of each axis
 # Three velocities each: fewer say no more than a segment's start, the wind and GPS's delay take.
@@ -81,32 +82,13 @@ def prepare_path_problem(
     IdentificationError
         If inertial sensors or all air data are missing, or no part of the flight is long enough.
     """
-    inertial = [*(f"{a}_radps" for a in "pqr"), *(f"a{a}_mps2" for a in "xyz")]
-    gps = all(name in columns for name in GPS)
-    vanes = all(name in columns for name in AIR[1:])
-    # Without vanes GPS tells the path, and airspeed the wind.
-    needed = (*inertial, AIR[0], "t_s") if gps else (*inertial, *AIR, "t_s")
-    missing = [c for c in needed if c not in columns]
-    if missing:
-        raise IdentificationError(f"data compatibility needs {', '.join(missing)}")
-    air = AIR if vanes else AIR[:1]
-    outputs = air + ((HEIGHT,) if HEIGHT in columns else ()) + (GPS if gps else ())
-    wanted = {*inertial, *outputs, "t_s", "phi_rad", "theta_rad", "psi_rad", "density_kgpm3"}
-    data = {k: v for k, v in columns.items() if k in wanted}
-    dt_s = float(data["t_s"][1] - data["t_s"][0])
-    if instrument is not None:
-        data |= {name: compensate_friction(data, name, instrument, dt_s) for name in air[1:]}
-        data |= {name: compensate_lowpass(data[name], instrument, dt_s) for name in inertial}
-    if airframe is not None:
-        data = _at_cg(data, airframe, dt_s)
+    outputs = _outputs(columns)
+    gps, vanes = GPS[0] in outputs, AIR[1] in outputs
+    data, dt_s = _sensors_at_cg(columns, outputs, airframe, instrument)
     block = max(1, round(BLOCK_S / dt_s))
-    half = max(2, round(SPEED_SMOOTH_S / dt_s))
-    data[SMOOTHED] = local_polynomial(data[AIR[0]][:, None], 2 * half + 1, 2)[:, 0]
-    fixes = gps_fixes(data) if gps else np.zeros(len(data["t_s"]), dtype=bool)
     cuts = _select_segments(data, dt_s, block, SEGMENT_S if gps else SHORT_SEGMENT_S)
-    for cut in cuts:
-        fixes[cut] &= np.sum(fixes[cut]) >= FEWEST_FIXES
-    if gps and not any(fixes[cut].any() for cut in cuts):
+    fixes = _fixes(data, gps, cuts)
+    if gps and not fixes.any():
         if not vanes:
             raise IdentificationError(
                 f"data compatibility: GPS has no fixes where the aircraft moved most, and without"
@@ -114,25 +96,81 @@ def prepare_path_problem(
             )
         without = {name: values for name, values in columns.items() if name not in GPS}
         return prepare_path_problem(without, airframe, instrument, usual)
-    vane = 0.0 if instrument is None else 1.0 / (2.0 * np.pi * instrument.vane_hz_per_mps)
-    place = np.zeros(3)
-    if airframe is not None and airframe.vanes_m:
-        place = np.mean(airframe.vanes_m, axis=0)
+    vane_s_mps = _vane_s_mps(instrument)
+    place_m = _vane_place_m(airframe)
     segments = [
-        replace(
-            _segment(data, cut, outputs, dt_s, block, vane, fixes[cut]),
-            vane_m=(float(place[0]), float(place[2])),
-        )
+        replace(_segment(data, cut, outputs, dt_s, block, vane_s_mps, fixes[cut]), vane_m=place_m)
         for cut in cuts
     ]
     start_sd = START_SD if gps else np.where(np.arange(len(START)) == 5, 1e-6, START_SD)
     priors = prior(instrument or usual, vanes=vanes)
-    if not gps:
-        priors = {k: v for k, v in priors.items() if k in WITHOUT_GPS}
+    priors = {k: v for k, v in priors.items() if gps or k in WITHOUT_GPS}
     problem = PathProblem(segments, outputs, priors, start_sd, block)
     t = data["t_s"]
     when = tuple((float(t[c.start]), float(t[c.stop - 1])) for c in cuts)
     return problem, [_lagged_inputs(columns, cut, block) for cut in cuts], when
+
+
+def _fixes(data: Mapping[str, Array], gps: bool, cuts: Sequence[slice]) -> BoolArray:
+    """Return which samples have a fix of GPS, in segments with enough of them."""
+    result = np.zeros(len(data["t_s"]), dtype=bool)
+    if gps:
+        fixes = gps_fixes(data)
+        for cut in cuts:
+            result[cut] = fixes[cut] & (np.sum(fixes[cut]) >= FEWEST_FIXES)
+    return result
+
+
+def _outputs(columns: Mapping[str, Array]) -> tuple[str, ...]:
+    """Return what tells the path; refuse a record without inertial sensors or air data.
+
+    Without vanes GPS tells the path, and airspeed the wind.
+    """
+    gps = all(name in columns for name in GPS)
+    vanes = all(name in columns for name in AIR[1:])
+    needed = (*IMU, AIR[0], "t_s") if gps else (*IMU, *AIR, "t_s")
+    missing = [c for c in needed if c not in columns]
+    if missing:
+        raise IdentificationError(f"data compatibility needs {', '.join(missing)}")
+    height = (HEIGHT,) if HEIGHT in columns else ()
+    return (*(AIR if vanes else AIR[:1]), *height, *(GPS if gps else ()))
+
+
+def _sensors_at_cg(
+    columns: Mapping[str, Array],
+    outputs: tuple[str, ...],
+    airframe: AirframeData | None,
+    instrument: SensorErrorModel | None,
+) -> tuple[dict[str, Array], float]:
+    """Return what is used of a record, friction, filters and places of sensors taken out; its step.
+
+    The airspeed behind local polynomials stands beside.
+    """
+    wanted = {*IMU, *outputs, "t_s", "phi_rad", "theta_rad", "psi_rad", "density_kgpm3"}
+    data = {k: v for k, v in columns.items() if k in wanted}
+    dt_s = float(data["t_s"][1] - data["t_s"][0])
+    if instrument is not None:
+        vanes = [name for name in AIR[1:] if name in outputs]
+        data |= {name: compensate_friction(data, name, instrument, dt_s) for name in vanes}
+        data |= {name: compensate_lowpass(data[name], instrument, dt_s) for name in IMU}
+    if airframe is not None:
+        data = _at_cg(data, airframe, dt_s)
+    half = max(2, round(SPEED_SMOOTH_S / dt_s))
+    data[SMOOTHED] = local_polynomial(data[AIR[0]][:, None], 2 * half + 1, 2)[:, 0]
+    return data, dt_s
+
+
+def _vane_s_mps(instrument: SensorErrorModel | None) -> float:
+    """Return the time constant of a vane times the airspeed, m; none where no file says it."""
+    return 0.0 if instrument is None else 1.0 / (2.0 * np.pi * instrument.vane_hz_per_mps)
+
+
+def _vane_place_m(airframe: AirframeData | None) -> tuple[float, float]:
+    """Return how far the vanes are before the CG and below it, m; at the CG where nobody knows."""
+    if airframe is None or not airframe.vanes_m:
+        return 0.0, 0.0
+    x, _, z = np.mean(airframe.vanes_m, axis=0)
+    return float(x), float(z)
 
 
 def vane_delay_by_file(i: SensorErrorModel, columns: Mapping[str, Array]) -> tuple[float, float]:
@@ -248,15 +286,7 @@ def _select_segments(
     excitation = {c.start: share for c, share in zip(candidates, shares, strict=True)}
     selected: list[slice] = []
     if "psi_rad" in data:
-        middle = np.array([np.median(data["psi_rad"][c]) for c in candidates])
-        for quadrant in range(QUADRANTS):
-            low = 2.0 * np.pi * quadrant / QUADRANTS
-            own = [
-                c
-                for c, psi in zip(candidates, np.mod(middle, 2.0 * np.pi), strict=True)
-                if low <= psi < low + 2.0 * np.pi / QUADRANTS
-            ]
-            selected += sorted(own, key=lambda c: -float(np.sum(excitation[c.start])))[:1]
+        selected = _of_each_heading(data["psi_rad"], excitation, candidates)
     rest = [c for c in candidates if c not in selected]
     while rest and len(selected) < MOST_SEGMENTS:
         known = LEAST_EXCITATION + sum(
@@ -266,6 +296,23 @@ def _select_segments(
         selected.append(best)
         rest.remove(best)
     return sorted(selected, key=lambda c: c.start)
+
+
+def _of_each_heading(
+    psi_rad: Array, excitation: Mapping[int, Array], candidates: Sequence[slice]
+) -> list[slice]:
+    """Return the segment of each quadrant of heading with most excitation."""
+    selected: list[slice] = []
+    middle = np.array([np.median(psi_rad[c]) for c in candidates])
+    for quadrant in range(QUADRANTS):
+        low = 2.0 * np.pi * quadrant / QUADRANTS
+        own = [
+            c
+            for c, psi in zip(candidates, np.mod(middle, 2.0 * np.pi), strict=True)
+            if low <= psi < low + 2.0 * np.pi / QUADRANTS
+        ]
+        selected += sorted(own, key=lambda c: -float(np.sum(excitation[c.start])))[:1]
+    return selected
 
 
 def _lagged_inputs(columns: Mapping[str, Array], cut: slice, block: int) -> Array:

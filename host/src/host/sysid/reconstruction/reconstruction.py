@@ -163,37 +163,62 @@ def reconstruct(
         if gps
         else _tests_without_gps(problem.common, fit.theta[:count], covariance, priors)
     )
-    findings = []
-    for name, (mean, sd) in priors.items():
-        known = name in problem.common and (gps or name not in UNOBSERVABLE_WITHOUT_GPS)
-        k = problem.common.index(name) if known else None
-        deviation = sd if k is None else float(np.sqrt(covariance[k, k]))
-        deviation = deviation if gps else min(NO_GPS_INFLATION * deviation, sd)
-        value = mean if k is None else float(fit.theta[k])
-        if name == FLOW[1] and not gps and deviation < sd:
-            value, deviation = _beside_imu((value, deviation), sd, priors)
-        data_informed = deviation < POSTERIOR_PRIOR_RATIO * sd
-        reason = "" if data_informed else _reason(name, gps=gps)
-        if name == DELAYS[0] and instrument is not None:
-            by_file = vane_delay_by_file(instrument, columns)
-            if _known_better((value, deviation), by_file):
-                sd, data_informed, reason = by_file[1], False, BY_FILE
-        findings.append(
-            SensorErrorEstimate(
-                name=name,
-                value=value,
-                half_width=NORMAL_95 * deviation,
-                prior_half_width=NORMAL_95 * sd,
-                data_informed=data_informed,
-                reason=reason,
-            )
-        )
+    found = {
+        name: (float(fit.theta[k]), float(np.sqrt(covariance[k, k])))
+        for k, name in enumerate(problem.common)
+        if gps or name not in UNOBSERVABLE_WITHOUT_GPS
+    }
+    vane_delay = None if instrument is None else vane_delay_by_file(instrument, columns)
+    findings = [_estimate(name, found, priors, vane_delay, gps=gps) for name in priors]
     squares = np.sum(np.hstack(fit.residuals) ** 2, axis=1)
     rms = {
         name: float(np.sqrt(q / problem.counted(name)))
         for name, q in zip(problem.model.outputs, squares, strict=True)
     }
     return Compatibility(tuple(findings), rms, when, gps, instrument, tests, vanes)
+
+
+def _estimate(
+    name: str,
+    found: Mapping[str, tuple[float, float]],
+    priors: Mapping[str, tuple[float, float]],
+    vane_delay: tuple[float, float] | None,
+    *,
+    gps: bool,
+) -> SensorErrorEstimate:
+    """Return what is known of a sensor's error by the flight, else beforehand.
+
+    Parameters
+    ----------
+    name : str
+    found, priors : mapping
+        Value and deviation by the flight, and beforehand.
+    vane_delay : tuple of float, optional
+        The vanes' by the aircraft file.
+    gps : bool
+    """
+    sd = priors[name][1]
+    value, deviation = found.get(name, priors[name])
+    if not gps:
+        deviation = min(NO_GPS_INFLATION * deviation, sd)
+        if name == FLOW[1] and deviation < sd:
+            value, deviation = _beside_imu((value, deviation), sd, priors)
+    data_informed = deviation < POSTERIOR_PRIOR_RATIO * sd
+    reason = "" if data_informed else _reason(name, gps=gps)
+    if (
+        name == DELAYS[0]
+        and vane_delay is not None
+        and _known_better((value, deviation), vane_delay)
+    ):
+        sd, data_informed, reason = vane_delay[1], False, BY_FILE
+    return SensorErrorEstimate(
+        name=name,
+        value=value,
+        half_width=NORMAL_95 * deviation,
+        prior_half_width=NORMAL_95 * sd,
+        data_informed=data_informed,
+        reason=reason,
+    )
 
 
 def by_calibration_alone(instrument: SensorErrorModel) -> Compatibility:

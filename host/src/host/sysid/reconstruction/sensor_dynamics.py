@@ -137,18 +137,19 @@ def perturb_columns(
         return result | {
             n: compensate_friction(columns, n, more_friction, dt_s) for n in ANGLES if n in columns
         }
-    if error in PLACES:
-        what, axis = error.split("_")[:2]
-        size = -size if what == "cg" else size
-        move = tuple(size if a == axis else 0.0 for a in "xyz")
-        place = (move[0], move[1], move[2])
-        frame = replace(
-            NO_OFFSETS,
-            imu_m=place if what != "vane" else NO_OFFSETS.imu_m,
-            vanes_m=(place,) if what != "imu" else (),
-        )
-        return transfer_to_cg(result, frame)
-    return result
+    return transfer_to_cg(result, _displaced(error, size)) if error in PLACES else result
+
+
+def _displaced(error: str, size_m: float) -> AirframeData:
+    """Return places of sensors that are off by an error of one of them, or of the CG."""
+    what, axis = error.split("_")[:2]
+    size_m = -size_m if what == "cg" else size_m
+    x, y, z = (size_m if a == axis else 0.0 for a in "xyz")
+    return replace(
+        NO_OFFSETS,
+        imu_m=(x, y, z) if what != "vane" else NO_OFFSETS.imu_m,
+        vanes_m=((x, y, z),) if what != "imu" else (),
+    )
 
 
 def advance_in_time(
