@@ -57,7 +57,7 @@ def fit_equation_error(
         model, maneuvers, bandwidth=bandwidth, use_rates=use_rates
     )
     warnings: list[str] = []
-    sample_weights = [np.ones(len(block.dependent)) for block in equations]
+    sample_weights: list[Array] = [np.ones(len(block.dependent)) for block in equations]
     iterations = 1
     theta = (
         _total(model, equations, len(names), deviations)
@@ -65,19 +65,7 @@ def fit_equation_error(
         else solve_least_squares(equations, len(names))
     )
     if variant in ("weighted", "robust"):
-        while iterations < 50:
-            iterations += 1
-            scales = _equation_scales(equations, theta, robust=variant == "robust")
-            before = theta
-            if variant == "robust":
-                for k, block in enumerate(equations):
-                    size = np.abs(block.residual(theta)) / scales[k]
-                    sample_weights[k] = np.minimum(1.0, HUBER_LIMIT / np.maximum(size, 1e-12))
-            theta = solve_least_squares(
-                _weighted(equations, sample_weights), len(names), scales**-2.0
-            )
-            if np.all(np.abs(theta - before) <= 1e-8 * np.abs(theta) + 1e-14):
-                break
+        theta, iterations = _reweighted(equations, theta, sample_weights, variant == "robust")
     elif variant not in ("ordinary", "total"):
         raise IdentificationError(
             f"equation error '{variant}' unknown; use ordinary, weighted, robust or total"
@@ -112,6 +100,31 @@ def fit_equation_error(
         converged=True,
         warnings=tuple(warnings),
     )
+
+
+def _reweighted(
+    equations: Sequence[RegressionEquation],
+    theta: Array,
+    sample_weights: list[Array],
+    robust: bool,
+) -> tuple[Array, int]:
+    """Return the solution by weights that follow its residuals, and iterations.
+
+    Those of samples are overwritten, where it is robust.
+    """
+    iterations = 1
+    while iterations < 50:
+        iterations += 1
+        scales = _equation_scales(equations, theta, robust=robust)
+        before = theta
+        if robust:
+            for k, block in enumerate(equations):
+                size = np.abs(block.residual(theta)) / scales[k]
+                sample_weights[k] = np.minimum(1.0, HUBER_LIMIT / np.maximum(size, 1e-12))
+        theta = solve_least_squares(_weighted(equations, sample_weights), len(theta), scales**-2.0)
+        if np.all(np.abs(theta - before) <= 1e-8 * np.abs(theta) + 1e-14):
+            break
+    return theta, iterations
 
 
 def _weighted(
@@ -225,8 +238,7 @@ def _total(
                 " model ties entries of several: use equation-error-weighted"
             )
         noisy = own[0].noisy_regressors[active] > 0.0
-        exact_columns, noisy_columns = X[:, active[~noisy]], X[:, active[noisy]]
-        block = np.column_stack([noisy_columns, y])
+        block = np.column_stack([X[:, active[noisy]], y])
         ends = np.cumsum([len(block.dependent) for block in own])[:-1]
         thirds = np.vstack([np.diff(part, n=3, axis=0) for part in np.split(block, ends)])
         noise = np.sqrt(np.mean(thirds**2, axis=0) / 20.0)
@@ -234,22 +246,7 @@ def _total(
             noise = np.append(_noise_of_columns(model, active[noisy], deviations[0]), 0.0)
             noise[-1] = deviations[1][equation]
         noise = np.maximum(noise, 1e-12 * np.max(np.abs(block), axis=0) + 1e-300)
-        block = block / noise
-        if exact_columns.shape[1]:
-            Q, _ = np.linalg.qr(exact_columns)
-            reduced = block - Q @ (Q.T @ block)
-        else:
-            reduced = block
-        _, _, vectors = np.linalg.svd(reduced, full_matrices=False)
-        last = vectors[-1]
-        if abs(last[-1]) < 1e-12:
-            raise IdentificationError("total least squares has no solution on these data")
-        solution = np.zeros(len(active))
-        solution[noisy] = -last[:-1] / last[-1] * noise[-1] / noise[:-1]
-        if exact_columns.shape[1]:
-            rest = y - noisy_columns @ solution[noisy]
-            solution[~noisy] = np.linalg.lstsq(exact_columns, rest, rcond=None)[0]
-        theta[active] = solution
+        theta[active[noisy]], theta[active[~noisy]] = _mixed(block, noise, X[:, active[~noisy]])
     if np.isnan(theta).any():
         raise IdentificationError(NO_EXCITATION)
     return theta
@@ -264,3 +261,20 @@ def _noise_of_columns(model: LinearModel, parameters: IntArray, states: Array) -
             if entries.column[t] < len(model.states):
                 power[k] += (entries.gain[t] * states[entries.column[t]]) ** 2
     return np.sqrt(power)
+
+
+def _mixed(block: Array, noise: Array, exact: Array) -> tuple[Array, Array]:
+    """Return the factors of the noisy columns [X y] and of the exact ones."""
+    reduced = block / noise
+    if exact.shape[1]:
+        Q, _ = np.linalg.qr(exact)
+        reduced = reduced - Q @ (Q.T @ reduced)
+    _, _, vectors = np.linalg.svd(reduced, full_matrices=False)
+    last = vectors[-1]
+    if abs(last[-1]) < 1e-12:
+        raise IdentificationError("total least squares has no solution on these data")
+    noisy = -last[:-1] / last[-1] * noise[-1] / noise[:-1]
+    if not exact.shape[1]:
+        return noisy, np.zeros(0)
+    rest = block[:, -1] - block[:, :-1] @ noisy
+    return noisy, np.linalg.lstsq(exact, rest, rcond=None)[0]

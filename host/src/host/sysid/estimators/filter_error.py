@@ -18,7 +18,12 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, has_equations
 from host.sysid.numerics.filter_problem import FilterProblem
-from host.sysid.numerics.gauss_newton import GaussNewtonResult, damped_step, gauss_newton
+from host.sysid.numerics.gauss_newton import (
+    STEP_LIMIT,
+    GaussNewtonResult,
+    damped_step,
+    gauss_newton,
+)
 from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.innovation_problem import InnovationLikelihood, InnovationProblem
 from host.sysid.numerics.maneuver_agreement import maneuver_influence
@@ -79,33 +84,22 @@ def fit_filter_error(
     if slow:
         raise IdentificationError(slow)
     problem = innovation_problem(model, maneuvers, _driven(model) if process is None else process)
-    if noise is None:
-        first, theta = _first_guess(problem, start)
-    else:
-        first = start_values(problem.output_problem) if start is None else start
-        theta = np.concatenate([first, noise])
+    first, theta = _started(problem, start, noise)
     n_noise = problem.n_model + len(problem.process)
     floor = noise_floor(maneuvers, theta[problem.n_model : n_noise])
     objective = InnovationObjective(problem, floor)
-    ends = {"step_limit": NEAR_BOUNDS} if roughly else {}
-    found = gauss_newton(objective, theta, max_iterations=MAX_ITERATIONS, **ends)
+    limit = NEAR_BOUNDS if roughly else STEP_LIMIT
+    found = gauss_newton(objective, theta, max_iterations=MAX_ITERATIONS, step_limit=limit)
     if found is None:
         raise IdentificationError(f"model {model.name}: the Kalman filter fails at the start")
     covariance = covariance_from_information(found.information)
     slopes: Array = np.zeros((len(maneuvers), len(theta)))
     if restricted and isinstance(problem, FilterProblem):
         found, slopes = _restricted(problem, objective, found, covariance)
-    theta, point = found.theta, found.trial
-    factor: Array = np.ones(len(theta))
-    if hac:
-        white = [point.whitened(k, point.as_filtered(k)) for k in range(len(maneuvers))]
-        steps_s = [m.dt_s for m in maneuvers]
-        factor = hac_inflation(problem.whitened_slopes(theta, point), white, steps_s, covariance)
-    n_model = problem.n_model
-    warnings = []
-    if not found.converged:
-        warnings.append(f"no convergence: last step {found.step:.3g} bounds long")
-    warnings += inflation_lines(model, factor)
+    theta, point, n_model = found.theta, found.trial, problem.n_model
+    factor = _inflation(problem, found, covariance) if hac else np.ones(len(theta))
+    creeps = f"no convergence: last step {found.step:.3g} bounds long"
+    warnings = [*(() if found.converged else (creeps,)), *inflation_lines(model, factor)]
     result = FitResult(
         method="filter error",
         model=problem.output_problem.model_at(theta[:n_model]),
@@ -129,12 +123,29 @@ def fit_filter_error(
             "hac_inflation": factor,
             "process_deviation": np.exp(theta[n_model:n_noise]),
             "noise_deviation": np.exp(theta[n_noise:]),
-            **maneuver_influence(
-                objective.parts, list(np.array(objective.scores) - slopes), covariance
-            ),
+            **maneuver_influence(objective.parts, list(objective.scores - slopes), covariance),
         },
     )
     return compare_noise_models(result, maneuvers, first) if compare_noise else result
+
+
+def _started(
+    problem: InnovationProblem, start: Array | None, noise: Array | None
+) -> tuple[Array, Array]:
+    """Return where output error begins, and where the filter does."""
+    if noise is None:
+        return _first_guess(problem, start)
+    first = start_values(problem.output_problem) if start is None else start
+    return first, np.concatenate([first, noise])
+
+
+def _inflation(
+    problem: InnovationProblem, found: GaussNewtonResult[InnovationLikelihood], covariance: Array
+) -> Array:
+    """Return the factors of standard errors by the autocorrelation of the scores."""
+    point, steps_s = found.trial, [m.dt_s for m in problem.maneuvers]
+    white = [point.whitened(k, point.as_filtered(k)) for k in range(len(steps_s))]
+    return hac_inflation(problem.whitened_slopes(found.theta, point), white, steps_s, covariance)
 
 
 def near_its_optimum(result: FitResult) -> bool:

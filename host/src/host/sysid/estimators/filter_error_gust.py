@@ -10,7 +10,7 @@ import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.estimators.filter_error import fit_filter_error, near_its_optimum
-from host.sysid.estimators.gust_delays import CALM_MPS, advance_outputs, estimate_delays
+from host.sysid.estimators.gust_delays import CALM_MPS, estimate_delays
 from host.sysid.estimators.gust_model import ROLL_GUST, gust_deviation_mps, gust_model
 from host.sysid.estimators.gust_penetration import PREFIX, ROLL_STATES, with_gust_penetration
 from host.sysid.estimators.innovations import innovations_of
@@ -21,6 +21,7 @@ from host.sysid.estimators.start_values import start_values_of
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.rate_forces import by_prior
+from host.sysid.models.residual_delays import advance_outputs
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.output_error_problem import OutputProblem
 
@@ -90,12 +91,9 @@ def fit_with_gust(
     delays_s = {name: value for name, (value, _) in late.delays.items()}
     shifted = [advance_outputs(m, model, delays_s) for m in maneuvers]
     result = fit_gust_state(bare, shifted, airspeed_mps, start, before, roughly)
-    quick = any(m.seen.all(axis=0).any() for m in maneuvers)
-    unfit = FORCELESS_IN_CALM if by_prior(model) else "" if quick else SLOW_IN_CALM
+    unfit = _unfit_in_calm(model, maneuvers)
     calm = gust_deviation_mps(result, airspeed_mps) < CALM_MPS
-    if by_prior(model) and not calm:
-        calm = not _moves(result, bare, shifted)
-    if unfit and calm:
+    if unfit and (calm or (by_prior(model) and not _moves(result, bare, shifted))):
         first = _ended(first)
         first = replace(first, warnings=(*first.warnings, unfit))
         return GustFit(first, model, tuple(maneuvers), {})
@@ -104,6 +102,14 @@ def fit_with_gust(
         covariance[:count, :count] += late.covariance
         result = replace(result, covariance=covariance)
     return GustFit(result, result.model, tuple(shifted), late.delays)
+
+
+def _unfit_in_calm(model: LinearModel, maneuvers: Sequence[Maneuver]) -> str:
+    """Return why a gust that is none would spoil a fit; empty where it would not."""
+    if by_prior(model):
+        return FORCELESS_IN_CALM
+    quick = any(m.seen.all(axis=0).any() for m in maneuvers)
+    return "" if quick else SLOW_IN_CALM
 
 
 def _ended(result: FitResult) -> FitResult:

@@ -22,6 +22,7 @@ from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.output_error_problem import check_shapes
 
 MAX_ITERATIONS = 40
+ROUNDS = 3  # of weights by equation
 
 
 def band(
@@ -102,22 +103,8 @@ def fit_frequency_equation_error(
             keys.append(row)
     used = np.flatnonzero(np.any([X.any(axis=0) for X in X_rows], axis=0))
     X_rows = [block[:, used] for block in X_rows]
-    weights = np.ones(len(keys))
-    theta: Array = np.zeros(len(used))
-    for _ in range(3):
-        normal = sum(w * X.T @ X for w, X in zip(weights, X_rows, strict=True))
-        right = sum(w * X.T @ y for w, X, y in zip(weights, X_rows, y_rows, strict=True))
-        theta = solve_normal_equations(np.asarray(normal), np.asarray(right))
-        power = {key: [0.0, 0.0] for key in keys}
-        for key, block, y in zip(keys, X_rows, y_rows, strict=True):
-            miss = y - block @ theta
-            free = int(np.count_nonzero(block.any(axis=0)))
-            power[key][0] += float(miss @ miss)
-            power[key][1] += max(len(y) - free, 1)
-        weights = np.array([power[key][1] / max(power[key][0], 1e-300) for key in keys])
-    covariance = covariance_from_information(
-        np.asarray(sum(w * X.T @ X for w, X in zip(weights, X_rows, strict=True)))
-    )
+    theta, information = _weighed_by_equation(keys, X_rows, y_rows)
+    covariance = covariance_from_information(information)
     residuals = [y - X @ theta for X, y in zip(X_rows, y_rows, strict=True)]
     per = len(active)
     stacked = tuple(
@@ -139,10 +126,37 @@ def fit_frequency_equation_error(
         fitted=fitted,
         residual_kind="rate",
         noise_covariance=np.atleast_2d(np.cov(np.vstack(stacked).T)),
-        iterations=3,
+        iterations=ROUNDS,
         converged=True,
         details={"states": float(n)},
     )
+
+
+def _weighed_by_equation(
+    keys: Sequence[int], X_rows: Sequence[Array], y_rows: Sequence[Array]
+) -> tuple[Array, Array]:
+    """Return the solution of equations, each weighed by what it leaves, and its information.
+
+    `keys` says which blocks are of one equation.
+    """
+    weights = np.ones(len(keys))
+    theta: Array = np.zeros(X_rows[0].shape[1])
+    for _ in range(ROUNDS):
+        right = sum(w * X.T @ y for w, X, y in zip(weights, X_rows, y_rows, strict=True))
+        theta = solve_normal_equations(_information(weights, X_rows), np.asarray(right))
+        power = {key: [0.0, 0.0] for key in keys}
+        for key, block, y in zip(keys, X_rows, y_rows, strict=True):
+            miss = y - block @ theta
+            free = int(np.count_nonzero(block.any(axis=0)))
+            power[key][0] += float(miss @ miss)
+            power[key][1] += max(len(y) - free, 1)
+        weights = np.array([power[key][1] / max(power[key][0], 1e-300) for key in keys])
+    return theta, _information(weights, X_rows)
+
+
+def _information(weights: Array, X_rows: Sequence[Array]) -> Array:
+    """Return the sum of X'X, weighed."""
+    return np.asarray(sum(w * X.T @ X for w, X in zip(weights, X_rows, strict=True)))
 
 
 @dataclass(slots=True)
@@ -154,6 +168,24 @@ class _Record:
     y: Spectrum  # (frequencies, p)
     samples: int
     dt_s: float
+
+
+def _record(
+    model: LinearModel, maneuver: Maneuver, limits_hz: tuple[float, float] | None
+) -> _Record:
+    """Return the transforms of a maneuver in a band."""
+    check_shapes(model, maneuver)
+    f = band(maneuver, maneuver.outputs, limits_hz)
+    columns = [maneuver.inputs, np.ones((maneuver.samples, 1))]
+    if model.hold == "foh":
+        columns.append(np.diff(maneuver.inputs, axis=0, append=maneuver.inputs[-1:]))
+    return _Record(
+        z=np.exp(2j * np.pi * f * maneuver.dt_s),
+        drive=transform(np.hstack(columns), maneuver.dt_s, f),
+        y=transform(maneuver.outputs, maneuver.dt_s, f),
+        samples=maneuver.samples,
+        dt_s=maneuver.dt_s,
+    )
 
 
 def fit_frequency_output_error(
@@ -182,24 +214,7 @@ def fit_frequency_output_error(
             "frequency output error has no delays or levers: use output-error"
         )
     n, count = len(model.states), len(model.parameters)
-    foh = model.hold == "foh"
-    records = []
-    for maneuver in maneuvers:
-        check_shapes(model, maneuver)
-        f = band(maneuver, maneuver.outputs, limits_hz)
-        columns = [maneuver.inputs, np.ones((maneuver.samples, 1))]
-        if foh:
-            columns.append(np.diff(maneuver.inputs, axis=0, append=maneuver.inputs[-1:]))
-        z = np.exp(2j * np.pi * f * maneuver.dt_s)
-        records.append(
-            _Record(
-                z=z,
-                drive=transform(np.hstack(columns), maneuver.dt_s, f),
-                y=transform(maneuver.outputs, maneuver.dt_s, f),
-                samples=maneuver.samples,
-                dt_s=maneuver.dt_s,
-            )
-        )
+    records = [_record(model, maneuver, limits_hz) for maneuver in maneuvers]
     objective = _Spectra(model, records)
     theta = np.concatenate(
         [

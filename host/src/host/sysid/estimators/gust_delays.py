@@ -13,7 +13,7 @@ no slope; its delay is a Pade filter (`_with_delay_terms`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +27,7 @@ from host.sysid.estimators.gust_penetration import PREFIX, with_gust_penetration
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.rate_forces import has_rate_forces
+from host.sysid.models.residual_delays import advance_outputs, moved_outputs
 from host.sysid.models.state_space_model import DelayGroup, LinearModel, Parameter, Term
 from host.sysid.numerics.output_error_problem import OutputProblem
 
@@ -105,30 +106,67 @@ def estimate_delays(
     by_force = bool(set(FORCES) & set(model.outputs))
     vanes = [d for d in groups if not by_force and _late_by_pade(d)]
     by_prior = [] if has_rate_forces(model) else vanes
+    found, estimate, values = _searched(
+        model, groups, by_prior, maneuvers, airspeed_mps, start[:count], process
+    )
+    if found is None or not near_its_optimum(found):
+        half = first.half_width()
+        delays = {d.name: (0.0, float(half[first.index(d.name)])) for d in groups}
+        return DelayEstimate(delays, estimate, _added_covariance(first, list(values), count))
+    found = _known_no_better(found, vanes, np.inf if by_prior else GUST_FORM)
+    told, counted = _with_what_passes(found, groups, model, maneuvers, airspeed_mps)
+    half = NORMAL_95 * told.standard_error
+    return DelayEstimate(
+        {n: (v, float(half[told.index(n)])) for n, v in values.items()},
+        estimate,
+        _added_covariance(counted, list(values), count),
+    )
+
+
+def _searched(
+    model: LinearModel,
+    groups: Sequence[DelayGroup],
+    known: Sequence[DelayGroup],
+    maneuvers: Sequence[Maneuver],
+    airspeed_mps: float,
+    estimate: Array,
+    process: tuple[str, ...],
+) -> tuple[FitResult | None, Array, dict[str, float]]:
+    """Return the last round's fit, its parameters, and all of each delay, in rounds.
+
+    What a round finds goes out of the outputs before the next; of delays that are `known` nothing.
+    """
     dt_s = max(m.dt_s for m in maneuvers)
     values = {d.name: 0.0 for d in groups}
-    estimate, found = start[:count], None
+    found = None
     for _ in range(ROUNDS):
         removed = {d.name: _removable(d, values[d.name], dt_s) for d in groups}
         shifted = [advance_outputs(m, model, removed) for m in maneuvers]
         step = _round(model, groups, shifted, airspeed_mps, estimate, removed, process)
         if step is None:
             break
-        found, estimate, before = step, step.estimate[:count], values
+        found, estimate, before = step, step.estimate[: len(model.parameters)], values
         values = {
             d.name: float(np.clip(removed[d.name] + step.value(d.name), -d.limit_s, d.limit_s))
             for d in groups
-        } | dict.fromkeys((d.name for d in by_prior), 0.0)
+        } | dict.fromkeys((d.name for d in known), 0.0)
         sd = step.standard_error
         if near_its_optimum(step) and all(
             abs(values[n] - before[n]) < SETTLED_SD * sd[step.index(n)] for n in values
         ):
             break
-    if found is None or not near_its_optimum(found):
-        half = first.half_width()
-        delays = {d.name: (0.0, float(half[first.index(d.name)])) for d in groups}
-        return DelayEstimate(delays, estimate, _added_covariance(first, list(values), count))
-    found = _known_no_better(found, vanes, np.inf if by_prior else GUST_FORM)
+    return found, estimate, values
+
+
+def _with_what_passes(
+    found: FitResult,
+    groups: Sequence[DelayGroup],
+    model: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    airspeed_mps: float,
+) -> tuple[FitResult, FitResult]:
+    """Return the fit with all that passes for a delay, and with what of it moves parameters."""
+    dt_s = max(m.dt_s for m in maneuvers)
     gust_mps = gust_deviation_mps(found, airspeed_mps)
     by_gusts = gust_mps / float(np.hypot(gust_mps, CALM_MPS))
     passing_s = {
@@ -137,15 +175,8 @@ def estimate_delays(
         else HOLD_SHARE * sampling_step_s(d, model, maneuvers)
         for d in groups
     }
-    widened = _with_hold_error(found, groups, passing_s)
-    half = NORMAL_95 * widened.standard_error
     less_s = {d.name: passing_s[d.name] * (1.0 if _late_by_pade(d) else by_gusts) for d in groups}
-    counted = _with_hold_error(found, groups, less_s)
-    return DelayEstimate(
-        {n: (v, float(half[widened.index(n)])) for n, v in values.items()},
-        estimate,
-        _added_covariance(counted, list(values), count),
-    )
+    return _with_hold_error(found, groups, passing_s), _with_hold_error(found, groups, less_s)
 
 
 def sampling_step_s(delay: DelayGroup, model: LinearModel, maneuvers: Sequence[Maneuver]) -> float:
@@ -153,32 +184,6 @@ def sampling_step_s(delay: DelayGroup, model: LinearModel, maneuvers: Sequence[M
     columns = [model.outputs.index(y) for y in delay.outputs if y in model.outputs]
     quickest = [np.max(np.mean(m.seen[:, columns], axis=0), initial=0.0) for m in maneuvers]
     return max(m.dt_s / max(float(q), 1e-3) for m, q in zip(maneuvers, quickest, strict=True))
-
-
-def advance_outputs(
-    maneuver: Maneuver, model: LinearModel, delays_s: Mapping[str, float]
-) -> Maneuver:
-    """Return the maneuver with each output advanced by its delay."""
-    shifts = {o: delays_s[d.name] for d in model.delays if d.name in delays_s for o in d.outputs}
-    return _moved(maneuver, np.array([shifts.get(name, 0.0) for name in model.outputs]))
-
-
-def _moved(maneuver: Maneuver, shifts_s: Array) -> Maneuver:
-    """Return the maneuver with each output earlier by a time, (p,) s.
-
-    At which samples it was measured moves along, to the nearest one.
-    """
-    t, rows = maneuver.time_s, np.arange(maneuver.samples)
-    columns = [np.interp(t + s, t, y) for s, y in zip(shifts_s, maneuver.outputs.T, strict=True)]
-    if maneuver.sampled is None:
-        return replace(maneuver, outputs=np.column_stack(columns))
-    sampled = np.ones_like(maneuver.sampled)
-    for j, steps in enumerate(np.round(shifts_s / maneuver.dt_s).astype(np.int64)):
-        if not maneuver.sampled[:, j].all():
-            before = rows + steps
-            known = (before >= 0) & (before < len(rows))
-            sampled[:, j] = known & maneuver.sampled[np.where(known, before, 0), j]
-    return replace(maneuver, outputs=np.column_stack(columns), sampled=sampled)
 
 
 def _round(
@@ -222,18 +227,12 @@ def _with_delay_terms(
     120 z1 - 60 z2 - 12 z3. The parameter is 1 / T, in which the model is linear (`_as_delays`).
     The filter of second order is 7 % short at half the sampling rate: a vane seemed 0.9 ms late.
     """
-    A, B, C, D = wide.matrices(theta)
+    _, _, C, _ = wide.matrices(theta)
     n, count = len(wide.states), len(wide.inputs)
     vanes = [(d, y) for d in groups for y in d.outputs if y in VANES and y in wide.outputs]
     size = n + PADE_STATES * len(vanes)
     wider_A, wider_C = np.zeros((size, size)), np.zeros((len(wide.outputs), size))
     wider_A[:n, :n], wider_C[:, :n] = wide.A, wide.C
-    by_state, by_input = np.zeros_like(wider_C), C @ B
-    by_state[:, :n] = C @ A
-    gust = np.array([name.startswith(PREFIX) for name in wide.states])
-    by_state[
-        np.ix_(np.any(C[:, gust] != 0.0, axis=1), np.append(gust, np.zeros(size - n, dtype=bool)))
-    ] = 0.0
     late = {wide.outputs.index(y) for _, y in vanes}
     terms = [
         replace(t, gain=-t.gain) if t.matrix == "C" and t.row in late else t for t in wide.terms
@@ -243,26 +242,8 @@ def _with_delay_terms(
         last = first + 2
         wider_C[k, :n] *= -1.0
         wider_C[k, first], wider_C[k, last] = 240.0, 24.0
-        terms += [
-            Term("A", first, first + 1, delay.name),
-            Term("A", first + 1, last, delay.name),
-            *(
-                Term("A", last, first + j, delay.name, g)
-                for j, g in enumerate((-120.0, -60.0, -12.0))
-            ),
-            *(Term("A", last, j, delay.name, float(g)) for j, g in enumerate(C[k]) if g),
-        ]
-    for delay in groups:
-        for k in (wide.outputs.index(o) for o in delay.outputs if o in wide.outputs):
-            if k in late:
-                continue
-            rows = (("C", 0, by_state[k]), ("D", 0, by_input[k]), ("D", count, D[k]))
-            terms += [
-                Term(matrix, k, first + j, delay.name, -float(gain))
-                for matrix, first, gains in rows
-                for j, gain in enumerate(gains)
-                if gain
-            ]
+        terms += _pade_terms(delay.name, first, C[k])
+    terms += _slope_terms(wide, groups, theta, late)
     still, by_force = np.zeros((size - n, 2 * count)), bool(set(FORCES) & set(wide.outputs))
     return replace(
         wide,
@@ -278,6 +259,40 @@ def _with_delay_terms(
             *(_parameter(d, removed[d.name], dt_s, by_force=by_force) for d in groups),
         ),
     )
+
+
+def _pade_terms(name: str, first: int, gains: Array) -> list[Term]:
+    """Return the filter of a vane that is late, its states from `first`, driven by what it sees."""
+    last = first + 2
+    return [
+        Term("A", first, first + 1, name),
+        Term("A", first + 1, last, name),
+        *(Term("A", last, first + j, name, g) for j, g in enumerate((-120.0, -60.0, -12.0))),
+        *(Term("A", last, j, name, float(g)) for j, g in enumerate(gains) if g),
+    ]
+
+
+def _slope_terms(
+    wide: LinearModel, groups: Sequence[DelayGroup], theta: Array, late: Collection[int]
+) -> list[Term]:
+    """Return what delays of outputs but the `late` ones do: minus the outputs' rates.
+
+    Of an output that sees the gust there is no rate by gust states.
+    """
+    A, B, C, D = wide.matrices(theta)
+    by_state, by_input, count = C @ A, C @ B, len(wide.inputs)
+    gust = np.array([name.startswith(PREFIX) for name in wide.states])
+    by_state[np.ix_(np.any(C[:, gust] != 0.0, axis=1), gust)] = 0.0
+    at = [(d.name, wide.outputs.index(y)) for d in groups for y in d.outputs if y in wide.outputs]
+    rates = (("C", 0, by_state), ("D", 0, by_input), ("D", count, D))
+    return [
+        Term(matrix, k, first + j, name, -float(gain))
+        for name, k in at
+        if k not in late
+        for matrix, first, gains in rates
+        for j, gain in enumerate(gains[k])
+        if gain
+    ]
 
 
 def _late_by_pade(delay: DelayGroup) -> bool:
@@ -306,7 +321,9 @@ def _parameter(delay: DelayGroup, removed_s: float, dt_s: float, *, by_force: bo
 
 def _centred(maneuver: Maneuver, model: LinearModel, dt_s: float) -> Maneuver:
     """Return deviations from the means, vanes a sample later: of a trim a delay shows nothing."""
-    late = _moved(maneuver, np.array([-dt_s if name in VANES else 0.0 for name in model.outputs]))
+    late = moved_outputs(
+        maneuver, np.array([-dt_s if name in VANES else 0.0 for name in model.outputs])
+    )
     inputs = maneuver.inputs - maneuver.inputs.mean(axis=0)
     rates = np.gradient(inputs, maneuver.dt_s, axis=0)
     return replace(

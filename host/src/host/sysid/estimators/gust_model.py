@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +14,7 @@ from host.sysid.models.state_space_model import LinearModel, Parameter, Term
 
 SCALE_M = 30.0  # of vertical gusts: about the height flown (MIL-F-8785C, sec. 3.7, low altitude)
 VANES = ("alpha_rad", "beta_rad")
+TURNS = {"alpha_rad": ("q_radps", -1.0), "beta_rad": ("r_radps", 1.0)}  # a gust at the tail later
 ROLL_GUST = "gust_roll_radps"
 LAGGED_GUST = "gust_lagged_rad"
 
@@ -55,60 +56,26 @@ def gust_model(
     IdentificationError
         If neither alpha nor beta is a measured state of it.
     """
-    vanes = [v for v in VANES if v in base.states and v in base.outputs]
-    if not vanes:
-        raise IdentificationError(f"model {base.name}: no vane angle a gust could act on")
-    vane, rate = vanes[0], airspeed_mps / scale_m
+    vane, rate = _vane(base), airspeed_mps / scale_m
     lag = 0.0 if span_m is None else np.pi * airspeed_mps / (4.0 * span_m)
-    rate_effect = {"alpha_rad": ("q_radps", -1.0), "beta_rad": ("r_radps", 1.0)}[vane]
-    # Columns of the base that each gust state acts like, with gains.
-    gust_states: dict[str, dict[str, float]] = {"gust_rad": {vane: 1.0}}
-    entries = [("gust_rad", "gust_rad", -1.0)]
-    fixed: list[tuple[str, str, float]] = []
-    if span_m is not None:
-        lead, trail = np.sqrt(3.0), 1.0 - np.sqrt(3.0)
-        entries += [("gust_lag_rad", "gust_rad", 1.0), ("gust_lag_rad", "gust_lag_rad", -1.0)]
-        gust_states = {
-            "gust_rad": {vane: lead, rate_effect[0]: rate_effect[1] * lag * lead},
-            "gust_lag_rad": {vane: trail, rate_effect[0]: rate_effect[1] * lag * trail},
-            "gust_tail_rad": {rate_effect[0]: -rate_effect[1] * lag},
-        }
-        fixed = [
-            ("gust_tail_rad", "gust_rad", lag * lead),
-            ("gust_tail_rad", "gust_lag_rad", lag * trail),
-            ("gust_tail_rad", "gust_tail_rad", -lag),
-        ]
-        if vane == "beta_rad" and "p_radps" in base.states:
-            gust_states[ROLL_GUST] = {"p_radps": 1.0}
-            fixed.append((ROLL_GUST, ROLL_GUST, -lag))
-    penetrates = GUST_LAG in base.parameter_names
-    if penetrates:
-        gust_states[LAGGED_GUST] = {}
-    rolls = ROLL_LAG in base.parameter_names
-    if rolls:
-        gust_states[ROLL_GUST] = {"p_radps": 1.0}
+    gust_states, entries, fixed = _spectrum(base, vane, lag)
+    penetrates, rolls = GUST_LAG in base.parameter_names, ROLL_LAG in base.parameter_names
+    gust_states |= {LAGGED_GUST: {}} if penetrates else {}
+    gust_states |= {ROLL_GUST: {"p_radps": 1.0}} if rolls else {}
     states = (*base.states, *gust_states)
     n, total = len(base.states), len(base.states) + len(gust_states)
     A, C = np.zeros((total, total)), np.zeros((len(base.outputs), total))
     A[:n, :n], C[:, :n] = base.A, base.C
     terms = list(base.terms)
-    for column, (_, acts) in enumerate(gust_states.items(), start=n):
-        for state, gain in acts.items():
-            source = base.states.index(state)
-            terms += [
-                Term(t.matrix, t.row, column, t.parameter, t.gain * gain)
-                for t in base.terms
-                if t.matrix in "AC" and t.column == source
-            ]
-            if state == vane:  # the vane measures the gust as well
-                C[:, column] += gain * base.C[:, source]
+    for column, acts in enumerate(gust_states.values(), start=n):
+        terms += _acting_like(base, acts, column)
+        if vane in acts:  # the vane measures the gust as well
+            C[:, column] += acts[vane] * base.C[:, base.states.index(vane)]
     if penetrates:
-        terms += _penetration_terms(base, states, base.states.index(rate_effect[0]))
+        terms += _penetration_terms(base, states, base.states.index(TURNS[vane][0]))
     if rolls:
         roll = states.index(ROLL_GUST)
         terms.append(Term("A", roll, roll, ROLL_LAG, -1.0))
-    for row, source_name, value in fixed:
-        A[states.index(row), states.index(source_name)] = value
     parameters = base.parameters
     if scale_share > 0.0:
         terms += [
@@ -120,8 +87,9 @@ def gust_model(
             ),
         )
     else:
-        for a, b, g in entries:
-            A[states.index(a), states.index(b)] = g * rate
+        fixed += [(a, b, g * rate) for a, b, g in entries]
+    for row, source, value in fixed:
+        A[states.index(row), states.index(source)] = value
     return replace(
         base,
         name=f"{base.name} with gust",
@@ -136,6 +104,57 @@ def gust_model(
         parameters=parameters,
         delays=(),
     )
+
+
+def _vane(base: LinearModel) -> str:
+    """Return the angle that a gust is; refuse a model without one."""
+    vanes = [v for v in VANES if v in base.states and v in base.outputs]
+    if not vanes:
+        raise IdentificationError(f"model {base.name}: no vane angle a gust could act on")
+    return vanes[0]
+
+
+def _spectrum(
+    base: LinearModel, vane: str, lag: float
+) -> tuple[dict[str, dict[str, float]], list[tuple[str, str, float]], list[tuple[str, str, float]]]:
+    """Return the gust's states, each with the columns of the base that it acts like and gains.
+
+    Behind them their entries times the gust's rate, and those that are fixed. `lag` is how fast
+    the tail follows, 1/s; without one the spectrum is of first order.
+    """
+    if lag == 0.0:
+        return {"gust_rad": {vane: 1.0}}, [("gust_rad", "gust_rad", -1.0)], []
+    lead, trail = np.sqrt(3.0), 1.0 - np.sqrt(3.0)
+    rate, sign = TURNS[vane]
+    states = {
+        "gust_rad": {vane: lead, rate: sign * lag * lead},
+        "gust_lag_rad": {vane: trail, rate: sign * lag * trail},
+        "gust_tail_rad": {rate: -sign * lag},
+    }
+    entries = [
+        ("gust_rad", "gust_rad", -1.0),
+        ("gust_lag_rad", "gust_rad", 1.0),
+        ("gust_lag_rad", "gust_lag_rad", -1.0),
+    ]
+    fixed = [
+        ("gust_tail_rad", "gust_rad", lag * lead),
+        ("gust_tail_rad", "gust_lag_rad", lag * trail),
+        ("gust_tail_rad", "gust_tail_rad", -lag),
+    ]
+    if vane == "beta_rad" and "p_radps" in base.states:
+        states[ROLL_GUST] = {"p_radps": 1.0}
+        fixed.append((ROLL_GUST, ROLL_GUST, -lag))
+    return states, entries, fixed
+
+
+def _acting_like(base: LinearModel, acts: Mapping[str, float], column: int) -> list[Term]:
+    """Return the terms of a state that acts like others of the base, so many times each."""
+    return [
+        Term(t.matrix, t.row, column, t.parameter, t.gain * gain)
+        for state, gain in acts.items()
+        for t in base.terms
+        if t.matrix in "AC" and t.column == base.states.index(state)
+    ]
 
 
 def driven_model(model: LinearModel, process: Sequence[str], airspeed_mps: float) -> LinearModel:

@@ -132,6 +132,12 @@ def inflation_lines(excess: float) -> tuple[str, ...]:
     )
 
 
+def own_constants(model: LinearModel) -> list[str]:
+    """Return the names of the constants that each record has of its own."""
+    rates = [f"bias_rate.{s}" for s in model.state_biases]
+    return rates + [f"bias.{y}" for y in model.output_biases]
+
+
 def fit_jointly(
     name: str,
     filter_pass: FilterPass,
@@ -174,19 +180,18 @@ def fit_jointly(
     deviation = noise_deviation(maneuvers) if noise is None else np.asarray(noise)
     spread = np.array([measured_spread(model, maneuvers[0], s, 1.0) for s in model.states])
     intensity = PROCESS_SHARE * spread if process is None else np.asarray(process)
-    locals_ = [f"bias_rate.{s}" for s in model.state_biases]
-    locals_ += [f"bias.{y}" for y in model.output_biases]
-    names = (*(p.name for p in model.parameters), *locals_)
+    names = (*(p.name for p in model.parameters), *own_constants(model))
     filter_ = JointFilter(model, np.diag(deviation**2), intensity, names, n)
     first = start_values_of(model, maneuvers)[:q] if start is None else np.array(start)
     size = n + len(names)
     joint: Array = np.zeros(size)
     P: Array = np.zeros((size, size))
-    spread_first = INITIAL_RELATIVE_SD * np.abs(first) + 1e-3 * np.max(np.abs(first))
-    for k, parameter in enumerate(model.parameters):
-        if np.isfinite(parameter.prior_sd):
-            spread_first[k] = parameter.prior_sd
-            first[k] = parameter.start if start is None else first[k]
+    known = np.array([p.prior_sd for p in model.parameters])
+    prior = np.isfinite(known)
+    usual = INITIAL_RELATIVE_SD * np.abs(first) + 1e-3 * np.max(np.abs(first))
+    spread_first = np.where(prior, known, usual)
+    if start is None:
+        first = np.where(prior, model.start, first)
     joint[n : n + q] = began = first
     residuals: list[Array] = []
     white: list[Array] = []

@@ -16,10 +16,12 @@ from host.sysid.estimators.kalman import (
     filter_result,
     filtered,
     measured_spread,
+    own_constants,
 )
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
+from host.sysid.models.state_space_model import Parameter
 from host.sysid.numerics.equation_filter import EquationModel, filter_equations
 from host.sysid.numerics.nonlinear_problem import NonlinearProblem
 from host.sysid.numerics.white_noise import noise_deviation
@@ -140,21 +142,12 @@ class _Layout:
 
 
 def _layout(model: NonlinearModel) -> _Layout:
-    n = len(model.states)
-    parameters = (*model.parameters, *model.own_parameters)
-    usual = [
-        p.prior_sd
-        if np.isfinite(p.prior_sd)
-        else INITIAL_RELATIVE_SD * abs(p.start)
-        + 1e-3 * max((abs(q.start) for q in parameters), default=0.0)
-        for p in parameters
-    ]
+    n, usual = len(model.states), _usual_deviations((*model.parameters, *model.own_parameters))
     count, delays = len(model.parameters), len(model.delays)
     biases = len(model.state_biases) + len(model.output_biases)
     names = (
         *model.parameter_names,
-        *(f"bias_rate.{s}" for s in model.state_biases),
-        *(f"bias.{y}" for y in model.output_biases),
+        *own_constants(model),
         *(p.name for p in model.own_parameters),
     )
     place = {name: n + k for k, name in enumerate(names)}
@@ -190,6 +183,17 @@ def _layout(model: NonlinearModel) -> _Layout:
         delay=np.array([late.get(y, -1) for y in model.outputs], dtype=np.int64),
         input_delay=np.array([late.get(u, -1) for u in model.inputs], dtype=np.int64),
     )  # fmt: skip
+
+
+def _usual_deviations(parameters: Sequence[Parameter]) -> list[float]:
+    """Return each parameter's deviation beforehand: of its prior, else a share of its start."""
+    largest = max((abs(p.start) for p in parameters), default=0.0)
+    return [
+        p.prior_sd
+        if np.isfinite(p.prior_sd)
+        else INITIAL_RELATIVE_SD * abs(p.start) + 1e-3 * largest
+        for p in parameters
+    ]
 
 
 def _passed(

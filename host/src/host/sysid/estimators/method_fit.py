@@ -90,7 +90,21 @@ def refuse_unless_finite(result: FitResult, method: str) -> None:
 
 
 def _check(method: str, by: Method, model: LinearModel, maneuvers: Sequence[Maneuver]) -> None:
-    """Raise if no method can fit: columns that do not fit the model, outputs that never move."""
+    """Raise if the method cannot fit the model, or no method the data."""
+    _refuse_what_it_cannot_hold(method, by, model)
+    for maneuver in maneuvers:
+        check_shapes(model, maneuver)
+    span = np.max([np.ptp(m.outputs, axis=0) for m in maneuvers], axis=0)
+    constant = [y for y, size in zip(model.outputs, span, strict=True) if size < NO_MOTION]
+    if constant:
+        raise IdentificationError(
+            f"{maneuvers[0].name}: {', '.join(constant)} never moved:"
+            " a dead sensor, or not connected"
+        )
+
+
+def _refuse_what_it_cannot_hold(method: str, by: Method, model: LinearModel) -> None:
+    """Raise if a model has what a method cannot hold, or nothing to fit."""
     own = has_equations(model) and model.own_parameters
     if not (model.parameter_names or own):
         raise IdentificationError(f"model {model.name} has no free parameter: nothing to fit")
@@ -106,13 +120,4 @@ def _check(method: str, by: Method, model: LinearModel, maneuvers: Sequence[Mane
         raise IdentificationError(
             f"{method} starts from the first samples and cannot hold known or shared initial"
             " states; output-error and filter-error can"
-        )
-    for maneuver in maneuvers:
-        check_shapes(model, maneuver)
-    span = np.max([np.ptp(m.outputs, axis=0) for m in maneuvers], axis=0)
-    constant = [y for y, size in zip(model.outputs, span, strict=True) if size < NO_MOTION]
-    if constant:
-        raise IdentificationError(
-            f"{maneuvers[0].name}: {', '.join(constant)} never moved:"
-            " a dead sensor, or not connected"
         )

@@ -79,22 +79,29 @@ def multistart(
     accepted = best is not None and best.converged and _residuals_are_noise(problem, best)
     if best is not None and accepted and not _nearly_singular(best):
         return best
+    best = _from_other_starts(problem, theta, best)
+    if best is None:
+        assert failure is not None
+        raise failure
+    if not best.converged:
+        best = minimise(problem, best.theta, max_iterations=LAST_SEARCH_ITERATIONS)
+    return best
+
+
+def _from_other_starts(
+    problem: OutputProblem, theta: Array, best: Optimum | None
+) -> Optimum | None:
+    """Return the best of `best` and searches from other starts, as many as are needed."""
     for rates_radps in HOMOTOPY_GAINS_RADPS:
         try:
             homotopy_theta = homotopy_start(problem, theta, rates_radps)
         except IdentificationError:
             continue
         best, _ = _try(problem, best, homotopy_theta)
-    accepted = best is not None and best.converged and _residuals_are_noise(problem, best)
-    if not accepted:
-        known = best if best is not None and best.converged else None
+    known = best if best is not None and best.converged else None
+    if known is None or not _residuals_are_noise(problem, known):
         for start in _starts(problem, theta, known)[:MOST_STARTS]:
             best, _ = _try(problem, best, start)
-    if best is None:
-        assert failure is not None
-        raise failure
-    if not best.converged:
-        best = minimise(problem, best.theta, max_iterations=LAST_SEARCH_ITERATIONS)
     return best
 
 

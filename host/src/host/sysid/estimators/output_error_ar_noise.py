@@ -224,14 +224,10 @@ def _fit_ar_models(
                 selected[j] = 0
                 updated.append(ArNoise.white())
                 continue
-            shares = [
-                response.sensitivities[j] @ lower[problem.columns(number)]
-                for number, response in enumerate(optimum.responses)
-            ]
             top = highest if selected[j] < 0 or round_number < 2 else selected[j]
             if problem.counts[j] < problem.samples:
                 top = 0  # the memory between two values of a slow sensor is not seen
-            moments = lagged_moments(residuals, shares, top)
+            moments = _moments(problem, optimum, lower, j, top)
             count = int(problem.counts[j]) - top * len(residuals)
             if orders is None and round_number < 2:
                 selected[j] = choose_order(moments, count, criterion=criterion)
@@ -248,6 +244,18 @@ def _fit_ar_models(
         if change < COEFFICIENT_CHANGE:
             break
     return memory, variance, selected
+
+
+def _moments(problem: OutputProblem, optimum: Optimum, lower: Array, j: int, top: int) -> Array:
+    """Return lagged moments of the errors of output `j`: residuals, and what the fit took of them.
+
+    `lower` is a root of the covariance of the fit.
+    """
+    shares = [
+        response.sensitivities[j] @ lower[problem.columns(number)]
+        for number, response in enumerate(optimum.responses)
+    ]
+    return lagged_moments([r[j] for r in optimum.residuals], shares, top)
 
 
 def _satterthwaite(

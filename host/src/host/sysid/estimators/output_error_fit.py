@@ -85,10 +85,20 @@ def fit_output_error(
     coherence = None
     if coloured_noise and highest_order > 0:
         fit, coherence = refit_beside_inputs(problem, fit, highest_order=highest_order)
+    result = _result(problem, fit, coloured_noise)
+    if coherence is None or not model_error:
+        return result
+    known = result.uncertainty
+    lacks = driven_by_inputs(result, known, coherence)
+    return result.with_uncertainty(known.with_model_error([lacks]))
+
+
+def _result(problem: OutputProblem, fit: ArNoiseFit, coloured_noise: bool) -> FitResult:
+    """Return a fit as the result of the method."""
     # Noise that is known is not judged by residuals.
     as_modelled = coloured_noise or bool(np.isfinite(problem.known_variance).all())
     covariance = fit.covariance if as_modelled else coloured_output_covariance(problem, fit)
-    result = FitResult(
+    return FitResult(
         method="output error" if coloured_noise else "output error (white)",
         model=problem.model_at(fit.optimum.theta),
         names=problem.names,
@@ -112,11 +122,6 @@ def fit_output_error(
             **_maneuver_influence(problem, fit),
         },
     )
-    if coherence is None or not model_error:
-        return result
-    known = result.uncertainty
-    lacks = driven_by_inputs(result, known, coherence)
-    return result.with_uncertainty(known.with_model_error([lacks]))
 
 
 def sample_periods(maneuvers: Sequence[Maneuver]) -> list[float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from host.sysid.estimators.regression import (
 )
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.state_space_model import EntryTable, LinearModel
 from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.output_error_problem import check_shapes
 
@@ -195,9 +195,7 @@ def fit_recursive_fourier(
             end = np.exp(-s * time_s[k])[:, None] * signals[k, : len(measured)]
             normal, right = previous[0].copy(), previous[1].copy()
             for row in sorted(set(entries.row.tolist())):
-                X: Spectrum = np.zeros((len(f), count), dtype=np.complex128)
-                for t in np.flatnonzero(entries.row == row):
-                    X[:, entries.parameter[t]] += entries.gain[t] * z[:, entries.column[t]]
+                X = _regressors(entries, row, z, count)
                 y = s * z[:, row] + end[:, row] - z @ fixed[row]
                 last[row] = (X, y)
                 normal += (X.conj().T @ X).real
@@ -213,15 +211,9 @@ def fit_recursive_fourier(
             whole.setdefault(row, []).append(lines)
     theta = solve_normal_equations(normal, right)
     batch = fit_equation_error(model, maneuvers)
-    # Equations have residuals of different power, so each weighs the score covariance with its own.
-    score_covariance = np.zeros_like(normal)
-    for parts in whole.values():
-        power = float(np.mean([np.mean(np.abs(y - X @ theta) ** 2) for X, y in parts]))
-        for X, _ in parts:
-            score_covariance += (X.conj().T @ X).real * power
     inverse = covariance_from_information(normal)
     covariance = batch.covariance.copy()
-    covariance[:count, :count] = inverse @ score_covariance @ inverse
+    covariance[:count, :count] = inverse @ _score_covariance(whole.values(), theta) @ inverse
     names, equations = regression_equations(model, maneuvers)
     full = batch.estimate.copy()
     full[:count] = theta
@@ -235,6 +227,26 @@ def fit_recursive_fourier(
         equations,
     )
     return replace(result, covariance=covariance, covariance_white=covariance)
+
+
+def _regressors(entries: EntryTable, row: int, z: Spectrum, count: int) -> Spectrum:
+    """Return what each of `count` parameters multiplies in the equation of a state."""
+    X: Spectrum = np.zeros((len(z), count), dtype=np.complex128)
+    for t in np.flatnonzero(entries.row == row):
+        X[:, entries.parameter[t]] += entries.gain[t] * z[:, entries.column[t]]
+    return X
+
+
+def _score_covariance(
+    equations: Iterable[Sequence[tuple[Spectrum, Spectrum]]], theta: Array
+) -> Array:
+    """Return the covariance of the scores; each equation has residuals of a power of its own."""
+    total: Array = np.zeros((len(theta), len(theta)))
+    for parts in equations:
+        power = float(np.mean([np.mean(np.abs(y - X @ theta) ** 2) for X, y in parts]))
+        for X, _ in parts:
+            total += (X.conj().T @ X).real * power
+    return total
 
 
 def _with_batch_statistics(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from scipy import linalg
 from host.arrays import Array, IntArray
 from host.errors import IdentificationError
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.state_space_model import EntryTable, LinearModel
 from host.sysid.numerics.differentiation import (
     signal_bandwidth_hz,
     smooth,
@@ -102,53 +102,74 @@ def regression_equations(
     """
     measured = model.measured_states()
     n_common = len(model.parameters)
-    extra = [j for j in range(len(model.outputs)) if j not in set(measured.tolist())]
+    extra = sorted(set(range(len(model.outputs))) - set(measured.tolist()))
     extra_biases = [y for y in model.output_biases if model.outputs.index(y) in extra]
     names = [p.name for p in model.parameters]
     for number in range(1, len(maneuvers) + 1):
         names += [f"bias_rate.{s}@{number}" for s in model.state_biases]
         names += [f"bias.{y}@{number}" for y in extra_biases]
     n_local = len(model.state_biases) + len(extra_biases)
-    state_entries, output_entries = model.entries("AB"), model.entries("CD")
+    sides = (
+        (model.entries("AB"), np.hstack([model.A, model.B]), range(len(model.states))),
+        (model.entries("CD"), np.hstack([model.C, model.D]), extra),
+    )
     equations: list[RegressionEquation] = []
     for number, maneuver in enumerate(maneuvers):
         check_shapes(model, maneuver)
         states, inputs, rates, outputs = _signals(model, maneuver, measured, bandwidth, use_rates)
         z = np.hstack([states, inputs])
         place = n_common + number * n_local
-        for entries, fixed, measured_side, indices, biases, offset in (
-            (state_entries, np.hstack([model.A, model.B]), rates, range(len(model.states)),
-             [model.states.index(s) for s in model.state_biases], place),
-            (output_entries, np.hstack([model.C, model.D]), outputs, extra,
-             [model.outputs.index(y) for y in extra_biases], place + len(model.state_biases)),
+        own = (
+            {model.states.index(s): place + k for k, s in enumerate(model.state_biases)},
+            {
+                model.outputs.index(y): place + len(model.state_biases) + k
+                for k, y in enumerate(extra_biases)
+            },
+        )
+        for (entries, fixed, rows), dependent, biases, first, labels in zip(
+            sides, (rates, outputs), own, (0, len(model.states)), (model.states, model.outputs),
+            strict=True,
         ):  # fmt: skip
-            for i in indices:
-                noisy = np.zeros(len(names))
-                regressors: dict[int, Array] = {}
-                for k in np.flatnonzero(entries.row == i):
-                    column, parameter = entries.column[k], int(entries.parameter[k])
-                    regressor = entries.gain[k] * z[:, column]
-                    noisy[parameter] = float(column < len(model.states))
-                    other = regressors.get(parameter)
-                    regressors[parameter] = regressor if other is None else other + regressor
-                if i in biases:
-                    regressors[offset + biases.index(i)] = np.ones(len(z))
-                active = sorted(p for p, regressor in regressors.items() if regressor.any())
-                if not active:
+            for i in rows:
+                regressors, noisy = _regressors(model, entries, i, z, biases)
+                if not regressors:
                     continue
-                is_state = measured_side is rates
+                active = sorted(regressors)
+                noise = np.zeros(len(names))
+                noise[noisy] = 1.0
                 equations.append(
                     RegressionEquation(
-                        equation=i if is_state else len(model.states) + i,
-                        label=model.states[i] if is_state else model.outputs[i],
+                        equation=first + i,
+                        label=labels[i],
                         maneuver=number,
-                        dependent=measured_side[:, i] - z @ fixed[i],
+                        dependent=dependent[:, i] - z @ fixed[i],
                         columns=np.array(active, dtype=np.int64),
                         active_regressors=np.stack([regressors[p] for p in active]).T,
-                        noisy_regressors=noisy,
+                        noisy_regressors=noise,
                     )
                 )
     return tuple(names), equations
+
+
+def _regressors(
+    model: LinearModel, entries: EntryTable, row: int, z: Array, biases: Mapping[int, int]
+) -> tuple[dict[int, Array], list[int]]:
+    """Return what each parameter of a row multiplies, and which of these are measured states.
+
+    `biases` are the parameters that are the biases of rows. What is zero everywhere is left out.
+    """
+    found: dict[int, Array] = {}
+    noisy: dict[int, bool] = {}
+    for k in np.flatnonzero(entries.row == row):
+        column, parameter = entries.column[k], int(entries.parameter[k])
+        noisy[parameter] = bool(column < len(model.states))
+        regressor = entries.gain[k] * z[:, column]
+        other = found.get(parameter)
+        found[parameter] = regressor if other is None else other + regressor
+    if row in biases:
+        found[biases[row]] = np.ones(len(z))
+    kept = {p: regressor for p, regressor in found.items() if regressor.any()}
+    return kept, [p for p, of_state in noisy.items() if of_state]
 
 
 def _signals(

@@ -10,7 +10,7 @@ import numpy as np
 from host.arrays import Array, BoolArray
 from host.errors import IdentificationError
 from host.sysid.estimators.equation_error import fit_equation_error
-from host.sysid.estimators.regression import regression_equations
+from host.sysid.estimators.regression import RegressionEquation, regression_equations
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
@@ -42,14 +42,7 @@ def choose_terms(
     total = float(np.sum((y - (y.mean() if selected else 0.0)) ** 2))
     for _ in range(4 * X.shape[1]):
         rss = _rss(X[:, selected], y)
-        best, best_f, best_rss = -1, 0.0, rss
-        for k in range(X.shape[1]):
-            if k in selected or not X[:, k].any():
-                continue
-            trial = _rss(X[:, [*selected, k]], y)
-            f = (rss - trial) / max(trial / max(len(y) - len(selected) - 1, 1), 1e-300)
-            if f > best_f:
-                best, best_f, best_rss = k, f, trial
+        best, best_f, best_rss = _best_to_enter(X, y, selected, rss)
         if best < 0 or best_f < f_in or (rss - best_rss) < gain * total:
             break
         selected.append(best)
@@ -60,6 +53,24 @@ def choose_terms(
             if f < f_in:
                 selected = rest
     return sorted(selected)
+
+
+def _best_to_enter(
+    X: Array, y: Array, selected: Sequence[int], rss: float
+) -> tuple[int, float, float]:
+    """Return the regressor of the largest partial F beside those selected, F and what it leaves.
+
+    It is -1 where none leaves less.
+    """
+    best, best_f, best_rss = -1, 0.0, rss
+    for k in range(X.shape[1]):
+        if k in selected or not X[:, k].any():
+            continue
+        trial = _rss(X[:, [*selected, k]], y)
+        f = (rss - trial) / max(trial / max(len(y) - len(selected) - 1, 1), 1e-300)
+        if f > best_f:
+            best, best_f, best_rss = k, f, trial
+    return best, best_f, best_rss
 
 
 def fit_stepwise(
@@ -87,13 +98,7 @@ def fit_stepwise(
         covariance of the selected structure.
     """
     names, equations = regression_equations(model, maneuvers, bandwidth=bandwidth)
-    retained: set[str] = set()
-    for equation in {block.equation for block in equations}:
-        own = [block for block in equations if block.equation == equation]
-        X = np.vstack([block.regressors for block in own])
-        y = np.concatenate([block.dependent for block in own])
-        forced = np.array([name.startswith("bias") for name in names]) & X.any(axis=0)
-        retained |= {names[k] for k in choose_terms(X, y, forced, f_in=f_in)}
+    retained = _retained(names, equations, f_in)
     dropped = [p.name for p in model.parameters if p.name not in retained]
     if not retained & {p.name for p in model.parameters}:
         raise IdentificationError(
@@ -105,14 +110,8 @@ def fit_stepwise(
         parameters=tuple(p for p in model.parameters if p.name in retained),
     )
     result = fit_equation_error(smaller, maneuvers, bandwidth=bandwidth)
-    place = [names.index(name) for name in result.names]
-    estimate = np.zeros(len(names))
-    estimate[place] = result.estimate
-    covariances = []
-    for covariance in (result.covariance, result.covariance_white):
-        full = np.zeros((len(names), len(names)))
-        full[np.ix_(place, place)] = covariance
-        covariances.append(full)
+    at = np.zeros((len(names), len(result.names)))  # where each parameter stands among all
+    at[[names.index(name) for name in result.names], range(len(result.names))] = 1.0
     warnings = result.warnings
     if dropped:
         warnings = (*warnings, f"not significant, set to zero: {', '.join(dropped)}")
@@ -121,13 +120,27 @@ def fit_stepwise(
         method="stepwise regression",
         model=model,
         names=names,
-        estimate=estimate,
-        covariance=covariances[0],
-        covariance_white=covariances[1],
+        estimate=at @ result.estimate,
+        covariance=at @ result.covariance @ at.T,
+        covariance_white=at @ result.covariance_white @ at.T,
         degrees_of_freedom=np.full(len(names), float(result.degrees_of_freedom[0])),
         warnings=warnings,
         details={"kept": float(len(smaller.parameters))},
     )
+
+
+def _retained(
+    names: Sequence[str], equations: Sequence[RegressionEquation], f_in: float
+) -> set[str]:
+    """Return the parameters of the terms that stay in some equation."""
+    retained: set[str] = set()
+    for equation in {block.equation for block in equations}:
+        own = [block for block in equations if block.equation == equation]
+        X = np.vstack([block.regressors for block in own])
+        y = np.concatenate([block.dependent for block in own])
+        forced = np.array([name.startswith("bias") for name in names]) & X.any(axis=0)
+        retained |= {names[k] for k in choose_terms(X, y, forced, f_in=f_in)}
+    return retained
 
 
 def _rss(X: Array, y: Array) -> float:

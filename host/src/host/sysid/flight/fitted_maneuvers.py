@@ -54,7 +54,11 @@ def fitted_and_held_out(
         raise NoManeuverError(_nothing_moved(flights) or _other_moved(flights, axes, template))
     # The order in which flights are given shall not choose the maneuver that is held out.
     mine.sort(key=lambda m: [(f.start_s, f.end_s, f.amplitude) for f in m.flight.maneuvers])
-    good = [m for m in mine if _worth_it(m)] or mine
+    return _apart([m for m in mine if _worth_it(m)] or mine)
+
+
+def _apart(good: list[FlownManeuver]) -> tuple[list[FlownManeuver], list[FlownManeuver]]:
+    """Return those to fit, and those held out with their responses; what was given is fitted."""
     held = _held_out([m for m in good if not m.found.given])
     return [m for m in good if m not in held], [replace(m, found=m.found.response()) for m in held]
 

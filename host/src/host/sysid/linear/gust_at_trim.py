@@ -9,13 +9,13 @@ from host.sysid.aerodynamics.thrust_terms import beside_thrust, thrust_terms
 from host.sysid.errors.departure import without_further_inputs
 from host.sysid.errors.trim_departure import correct_trim_departure
 from host.sysid.estimators.filter_error_gust import fit_with_gust
-from host.sysid.estimators.gust_delays import advance_outputs
 from host.sysid.linear.linear_stages import LinearFit
 from host.sysid.linear.model_names import GUST
 from host.sysid.linear.prepared_columns import PreparedColumns
 from host.sysid.models.fit_result import without_parameters
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.reduced_model import without_inputs
+from host.sysid.models.residual_delays import advance_outputs
 from host.sysid.models.thrust_column import THRUST
 
 

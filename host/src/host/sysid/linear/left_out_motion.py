@@ -18,7 +18,7 @@ from host.sysid.aerodynamics.thrust_terms import thrust_terms
 from host.sysid.errors.departure import Departure
 from host.sysid.errors.trim_departure import correct_trim_departure
 from host.sysid.estimators.filter_error_gust import fit_with_gust
-from host.sysid.estimators.gust_delays import CALM_MPS, advance_outputs
+from host.sysid.estimators.gust_delays import CALM_MPS
 from host.sysid.estimators.gust_model import gust_deviation_mps
 from host.sysid.estimators.gust_penetration import penetration_of
 from host.sysid.estimators.method_fit import fit
@@ -30,6 +30,7 @@ from host.sysid.linear.prepared_columns import PreparedColumns
 from host.sysid.linear.users_model import no_filter, no_gust_state
 from host.sysid.models.fit_result import FitResult, without_parameters
 from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.residual_delays import advance_outputs
 from host.sysid.models.state_space_model import LinearModel
 
 # Of a term, from what is usual: gusts that turned both passed for it at 4 to 9, in calm air it was

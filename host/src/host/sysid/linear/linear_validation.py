@@ -6,11 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from host.arrays import Array
-from host.sysid.estimators.gust_delays import advance_outputs
 from host.sysid.estimators.innovations import driven_states
 from host.sysid.linear.linear_stages import LinearEstimate, LinearIntervals, LinearValidation
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.residual_delays import delays_of
+from host.sysid.models.residual_delays import advance_outputs, delays_of
 from host.sysid.models.state_space_model import DelayGroup, LinearModel
 from host.sysid.validation.free_simulation import fits_of, free_simulation, frozen_model
 from host.sysid.validation.prediction_limits import Prediction, missed, predictions

@@ -17,7 +17,6 @@ from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.estimators.filter_error import near_its_optimum
 from host.sysid.estimators.filter_error_gust import SLOW_IN_CALM, fit_with_gust
-from host.sysid.estimators.gust_delays import advance_outputs
 from host.sysid.estimators.gust_model import VANES
 from host.sysid.estimators.method_fit import fit
 from host.sysid.estimators.noise_model_comparison import bayes_criterion
@@ -25,6 +24,7 @@ from host.sysid.estimators.output_error_fit import sample_periods
 from host.sysid.linear.linear_stages import LinearFit
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.residual_delays import advance_outputs
 from host.sysid.models.state_space_model import LinearModel, has_equations
 from host.sysid.numerics.model_problems import needs_compiler
 
@@ -99,11 +99,7 @@ def fit_by_evidence(
         named = replace(plain.result, method="output error (white)")
         line = f"{NOISE_CHOSEN}: white, for residuals are not coloured"
         return _found(WHITE, named, plain.maneuvers, remarks=(line,))
-    why = no_filter(model, maneuvers)
-    late = sum(bool({*d.outputs} & {*model.outputs}) for d in model.delays)  # inputs cost nothing
-    work = sum(m.samples for m in maneuvers) * len(plain.result.estimate) * (1 + late)
-    if not why and has_equations(model) and work > MOST_WORK:
-        why = f"that would take many minutes; --method {FILTER} does it"
+    why = no_filter(model, maneuvers) or _too_long(model, maneuvers, len(plain.result.estimate))
     if why:
         return replace(plain, remarks=(f"{NOISE_CHOSEN}: {own}; no gust tried: {why}",))
     try:
@@ -118,6 +114,15 @@ def fit_by_evidence(
     chosen, name, other = (moving, "gusts", own) if ahead > 0.0 else (plain, own, "gusts")
     line = f"{NOISE_CHOSEN}: {name} (BIC is {abs(ahead):.0f} lower than with {other})"
     return replace(chosen, remarks=(line, *chosen.remarks))
+
+
+def _too_long(model: LinearModel, maneuvers: Sequence[Maneuver], unknowns: int) -> str:
+    """Return why a filter of equations takes minutes; empty where it does not."""
+    late = sum(bool({*d.outputs} & {*model.outputs}) for d in model.delays)  # inputs cost nothing
+    work = sum(m.samples for m in maneuvers) * unknowns * (1 + late)
+    if has_equations(model) and work > MOST_WORK:
+        return f"that would take many minutes; --method {FILTER} does it"
+    return ""
 
 
 def no_filter(model: LinearModel, maneuvers: Sequence[Maneuver]) -> str:

@@ -107,6 +107,24 @@ def coefficients_from(document: Mapping[str, object], source: str) -> Coefficien
             f"{source}: unknown key {', '.join(unknown)}; known are {', '.join(KEYS)}"
         )
     reported, nuisance = (_lists(document.get(key, {}), f"{source}: [{key}]") for key in KEYS[2:])
+    fitted = _fitted_rows(reported, nuisance, source)
+    equations, not_reported = {}, set()
+    for row in fitted:
+        texts = [*reported[row], *nuisance.get(row, ())]
+        terms = tuple(parse_term(text, row, f"{source}: {row}") for text in texts)
+        for term, count in Counter(terms).items():
+            if count > 1:
+                raise IdentificationError(f"{source}: {row}: {term.label} stands there twice")
+        equations[row] = terms
+        not_reported |= {f"{row}_{term.label}" for term in terms[len(reported[row]) :]}
+    name = str(document.get("name", Path(source).stem))
+    return CoefficientModel(name, equations, frozenset(not_reported))
+
+
+def _fitted_rows(
+    reported: Mapping[str, list[str]], nuisance: Mapping[str, list[str]], source: str
+) -> list[str]:
+    """Return the rows that have terms; refuse unknown ones, and nuisance terms alone."""
     forces = BODY if set(BODY) & set(reported) else WIND
     expected = (*forces, *MOMENTS_AND_SIDE)
     for row in (*reported, *nuisance):
@@ -122,17 +140,7 @@ def coefficients_from(document: Mapping[str, object], source: str) -> Coefficien
             f"{source}: no terms for {', '.join(nuisance_only or expected)};"
             " [rows] needs one row or more"
         )
-    equations, not_reported = {}, set()
-    for row in fitted:
-        texts = [*reported[row], *nuisance.get(row, ())]
-        terms = tuple(parse_term(text, row, f"{source}: {row}") for text in texts)
-        for term, count in Counter(terms).items():
-            if count > 1:
-                raise IdentificationError(f"{source}: {row}: {term.label} stands there twice")
-        equations[row] = terms
-        not_reported |= {f"{row}_{term.label}" for term in terms[len(reported[row]) :]}
-    name = str(document.get("name", Path(source).stem))
-    return CoefficientModel(name, equations, frozenset(not_reported))
+    return fitted
 
 
 def _lists(value: object, where: str) -> dict[str, list[str]]:

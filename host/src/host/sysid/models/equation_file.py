@@ -79,26 +79,14 @@ def equations_from(document: Mapping[str, object], name: str = "model") -> Nonli
         raise IdentificationError(
             f"unknown key {in_a_line(', '.join(unknown))}; known are {', '.join(KEYS)}"
         )
-    inputs, columns = (
-        names_from(document, key, "") if key in document else () for key in ("inputs", "columns")
-    )
+    inputs, columns = _inputs(document)
     texts = {key: _texts(document, key) for key in ("rates", "outputs", "definitions", "starts")}
-    for key in ("rates", "outputs"):
-        if not texts[key]:
-            raise IdentificationError(f"[{key}] is missing: a name = an expression, at least one")
-    if not inputs and not columns:
-        columns = (CONSTANT,)  # free motion
-    if len(inputs) + len(columns) > MOST_INPUTS:
-        raise IdentificationError(f"more than {MOST_INPUTS} inputs and columns")
-    states = tuple(name for name, _ in texts["rates"])
-    outputs = tuple(name for name, _ in texts["outputs"])
-    parameters, own = _parameters(document)
-    constants = tuple(
-        (key, _ANY.check(f"constants.{key}", value, IdentificationError))
-        for key, value in _section(document, "constants").items()
+    states, outputs, defined, started = (
+        tuple(name for name, _ in texts[key])
+        for key in ("rates", "outputs", "definitions", "starts")
     )
-    tables = _tables(document)
-    defined = tuple(name for name, _ in texts["definitions"])
+    parameters, own = _parameters(document)
+    constants, tables = _numbers(document), _tables(document)
     # An output may have the name of a state or of what it measures; nothing else twice.
     _refuse_twice(
         {
@@ -111,7 +99,7 @@ def equations_from(document: Mapping[str, object], name: str = "model") -> Nonli
             "a table": [name for name, _, _ in tables],
         }
     )
-    strangers = sorted({name for name, _ in texts["starts"]} - set(states))
+    strangers = sorted({*started} - {*states})
     if strangers:
         raise IdentificationError(f"starts.{strangers[0]}: no state; there are {', '.join(states)}")
     equations = Equations(
@@ -125,15 +113,8 @@ def equations_from(document: Mapping[str, object], name: str = "model") -> Nonli
         inputs=(*inputs, *columns),
         controls=len(inputs),
     )
-    nodes = equations.nodes()
-    used = {
-        nodes.graph.nodes[k].name for k in nodes.graph.reachable([*nodes.rates, *nodes.outputs])
-    }
     initial = _constants(document, "initial_states", states, states)
-    used |= {name for _, name in initial.shared}
-    idle = [name for name in equations.parameters if name not in used]
-    if idle:
-        raise IdentificationError(f"parameters.{idle[0]}: enters no expression")
+    _refuse_idle(equations, [name for _, name in initial.shared])
     equations.text()  # what is too large with its slopes is refused now
     equations.check_starts()
     zero = no_tangent(equations)
@@ -161,8 +142,37 @@ def equations_from(document: Mapping[str, object], name: str = "model") -> Nonli
         delays=_delays(document, [p.name for p in (*parameters, *own)]),
         hold=LINE if hold == SMOOTH else hold,
         smooth=hold == SMOOTH,
-        process_noise=_process_noise(document, states, nodes, equations.parameters),
+        process_noise=_process_noise(document, states, equations.nodes(), equations.parameters),
     )
+
+
+def _inputs(document: Mapping[str, object]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return what a pilot moves and what is measured; without either a motion is free."""
+    inputs, columns = (
+        names_from(document, key, "") if key in document else () for key in ("inputs", "columns")
+    )
+    if len(inputs) + len(columns) > MOST_INPUTS:
+        raise IdentificationError(f"more than {MOST_INPUTS} inputs and columns")
+    return inputs, columns or (() if inputs else (CONSTANT,))
+
+
+def _numbers(document: Mapping[str, object]) -> tuple[tuple[str, float], ...]:
+    """Return the constants."""
+    return tuple(
+        (key, _ANY.check(f"constants.{key}", value, IdentificationError))
+        for key, value in _section(document, "constants").items()
+    )
+
+
+def _refuse_idle(equations: Equations, starting: Collection[str]) -> None:
+    """Refuse a parameter that enters no expression, and is no initial state."""
+    nodes = equations.nodes()
+    used = {
+        nodes.graph.nodes[k].name for k in nodes.graph.reachable([*nodes.rates, *nodes.outputs])
+    }
+    idle = [name for name in equations.parameters if name not in {*used, *starting}]
+    if idle:
+        raise IdentificationError(f"parameters.{idle[0]}: enters no expression")
 
 
 def _texts(document: Mapping[str, object], key: str) -> tuple[tuple[str, str], ...]:
@@ -171,6 +181,8 @@ def _texts(document: Mapping[str, object], key: str) -> tuple[tuple[str, str], .
         if isinstance(value, bool) or not isinstance(value, str | int | float):
             raise IdentificationError(f"{key}.{name}: {shown(value)}, expected an expression")
         found.append((name, value if isinstance(value, str) else repr(value)))
+    if key in ("rates", "outputs") and not found:
+        raise IdentificationError(f"[{key}] is missing: a name = an expression, at least one")
     return tuple(found)
 
 

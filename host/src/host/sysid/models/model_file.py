@@ -152,27 +152,8 @@ def read_trim(path: Path) -> Trim:
 
 def model_from(document: Mapping[str, object], source: str = "model") -> LinearModel:
     """Build a model from a parsed document."""
-    if not document:
-        raise IdentificationError(
-            f"{source}: nothing in it, expected states, inputs, outputs, A to D"
-        )
-    unknown_keys = sorted(set(document) - KEYS)
-    if unknown_keys:
-        raise IdentificationError(
-            f"{source}: unknown key {', '.join(unknown_keys)}; known are {', '.join(sorted(KEYS))}"
-        )
-    signals = {
-        key: names_from(document, key, f"{source}: ") for key in ("states", "inputs", "outputs")
-    }
-    if both := [name for name in signals["inputs"] if name in signals["states"]]:
-        raise IdentificationError(
-            f"{source}: {both[0]} is a state and an input: it may be one of them"
-        )
+    signals = _signals(document, source)
     n, m, p = (len(signals[key]) for key in ("states", "inputs", "outputs"))
-    if max(n, m, p) > MOST_SIGNALS:
-        raise IdentificationError(
-            f"{source}: {max(n, m, p)} states, inputs or outputs, expected up to {MOST_SIGNALS}"
-        )
     shapes = {"A": (n, n), "B": (n, m), "C": (p, n), "D": (p, m)}
     fixed: dict[str, Array] = {}
     terms: list[Term] = []
@@ -217,6 +198,32 @@ def model_from(document: Mapping[str, object], source: str = "model") -> LinearM
         shared_starts=starts.shared,
         known_noise=read_noise(document.get("noise", {}), signals["outputs"], f"{source}: noise"),
     )
+
+
+def _signals(document: Mapping[str, object], source: str) -> dict[str, tuple[str, ...]]:
+    """Return states, inputs and outputs; refuse a document that is no model."""
+    if not document:
+        raise IdentificationError(
+            f"{source}: nothing in it, expected states, inputs, outputs, A to D"
+        )
+    unknown_keys = sorted(set(document) - KEYS)
+    if unknown_keys:
+        raise IdentificationError(
+            f"{source}: unknown key {', '.join(unknown_keys)}; known are {', '.join(sorted(KEYS))}"
+        )
+    signals = {
+        key: names_from(document, key, f"{source}: ") for key in ("states", "inputs", "outputs")
+    }
+    if both := [name for name in signals["inputs"] if name in signals["states"]]:
+        raise IdentificationError(
+            f"{source}: {both[0]} is a state and an input: it may be one of them"
+        )
+    most = max(map(len, signals.values()))
+    if most > MOST_SIGNALS:
+        raise IdentificationError(
+            f"{source}: {most} states, inputs or outputs, expected up to {MOST_SIGNALS}"
+        )
+    return signals
 
 
 def _matrix(

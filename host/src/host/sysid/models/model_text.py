@@ -10,7 +10,7 @@ from host.export.toml import toml_number, toml_value
 from host.sysid.models.equation_text import delay_lines, equation_text
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.model_constants import OWN
-from host.sysid.models.state_space_model import MATRICES, LinearModel, has_equations
+from host.sysid.models.state_space_model import MATRICES, LinearModel, Parameter, has_equations
 from host.sysid.models.templates import Trim
 from host.sysid.models.thrust_column import ThrustColumn
 
@@ -47,22 +47,11 @@ def model_text(
         lines.append(f"noise = {_table(dict(model.known_noise))}")
     if not model.delays:
         lines.append("delays = []")
-    for label in MATRICES:
-        matrix = getattr(model, label)
-        rows = []
-        for i in range(matrix.shape[0]):
-            entries = [_entry(model, label, i, j) for j in range(matrix.shape[1])]
-            rows.append("[" + ", ".join(entries) + "]")
-        lines.append(f"{label} = [" + ", ".join(rows) + "]")
+    lines += [_matrix(model, label) for label in MATRICES]
     lines.append("[parameters]")
-    for k, parameter in enumerate(model.parameters):
-        start = parameter.start if result is None else result.estimate[k]
-        parts = [f"start = {toml_number(start)}"]
-        for key in ("lower", "upper", "prior_sd"):
-            value = getattr(parameter, key)
-            if np.isfinite(value):
-                parts.append(f"{key} = {toml_number(value)}")
-        lines.append(f"{toml_value(parameter.name)} = {{ {', '.join(parts)} }}")
+    starts = model.start if result is None else result.estimate
+    for parameter, start in zip(model.parameters, starts, strict=False):
+        lines.append(_parameter(parameter, float(start)))
     if result is not None:
         lines.append("[fit]")
         lines.append(f'method = "{result.method}"')
@@ -78,6 +67,13 @@ def model_text(
     if thrust is not None:
         lines += thrust.lines()
     lines += delay_lines(model.delays)
+    lines += _lever_lines(model)
+    return "\n".join(lines) + "\n"
+
+
+def _lever_lines(model: LinearModel) -> list[str]:
+    """Return the places of accelerometers that are parameters."""
+    lines = []
     for offset in model.accelerometer_offsets:
         lines += [
             "[[levers]]",
@@ -86,7 +82,24 @@ def model_text(
             f'parameter = "{offset.parameter}"',
             f"gain = {toml_number(offset.gain)}",
         ]
-    return "\n".join(lines) + "\n"
+    return lines
+
+
+def _matrix(model: LinearModel, label: str) -> str:
+    """Return the line of a matrix, free entries by their parameters."""
+    count, width = getattr(model, label).shape
+    rows = (", ".join(_entry(model, label, i, j) for j in range(width)) for i in range(count))
+    return f"{label} = [" + ", ".join(f"[{row}]" for row in rows) + "]"
+
+
+def _parameter(parameter: Parameter, start: float) -> str:
+    """Return the line of a parameter: start, and what is known of it beforehand."""
+    parts = [f"start = {toml_number(start)}"]
+    for key in ("lower", "upper", "prior_sd"):
+        value = getattr(parameter, key)
+        if np.isfinite(value):
+            parts.append(f"{key} = {toml_number(value)}")
+    return f"{toml_value(parameter.name)} = {{ {', '.join(parts)} }}"
 
 
 def _starts(model: LinearModel) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Literal
 
+from host.sysid.models.residual_delays import delays_of
 from host.sysid.models.state_space_model import LinearModel, Term
 
 
@@ -25,9 +26,6 @@ def _kept(
 def without_outputs(model: LinearModel, names: Sequence[str]) -> LinearModel:
     """Return a model without some of its outputs; delays without outputs are removed too."""
     keep = [k for k, y in enumerate(model.outputs) if y not in names]
-    delays = [
-        replace(d, outputs=tuple(y for y in d.outputs if y not in names)) for d in model.delays
-    ]
     placed = tuple(x for x in model.accelerometer_offsets if x.output not in names)
     lost = {x.parameter for x in model.accelerometer_offsets} - {x.parameter for x in placed}
     return replace(
@@ -39,7 +37,7 @@ def without_outputs(model: LinearModel, names: Sequence[str]) -> LinearModel:
         parameters=tuple(p for p in model.parameters if p.name not in lost),
         output_biases=tuple(y for y in model.output_biases if y not in names),
         known_noise=tuple((y, sd) for y, sd in model.known_noise if y not in names),
-        delays=tuple(d for d in delays if d.outputs),
+        delays=delays_of(set(model.delayed_signals()) - set(names), model.delays),
         accelerometer_offsets=placed,
     )
 

@@ -1,10 +1,14 @@
-"""Standard residual delays of each group of sensors, for models that name none of their own."""
+"""Residual delays of each group of sensors, standard where a model names none; outputs without."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
+import numpy as np
+
+from host.arrays import Array
+from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import DelayGroup, LinearModel
 
 # Prior deviation of the delay that remains of each sensor once the nominal one is removed, s.
@@ -42,3 +46,29 @@ def without_standard_delays(model: LinearModel) -> LinearModel:
     """Return a model without the standard delays, with those of its own."""
     standard = delays_of(model.outputs)
     return replace(model, delays=tuple(d for d in model.delays if d not in standard))
+
+
+def advance_outputs(
+    maneuver: Maneuver, model: LinearModel, delays_s: Mapping[str, float]
+) -> Maneuver:
+    """Return the maneuver with each output advanced by its delay."""
+    shifts = {o: delays_s[d.name] for d in model.delays if d.name in delays_s for o in d.outputs}
+    return moved_outputs(maneuver, np.array([shifts.get(name, 0.0) for name in model.outputs]))
+
+
+def moved_outputs(maneuver: Maneuver, shifts_s: Array) -> Maneuver:
+    """Return the maneuver with each output earlier by a time, (p,) s.
+
+    At which samples it was measured moves along, to the nearest one.
+    """
+    t, rows = maneuver.time_s, np.arange(maneuver.samples)
+    columns = [np.interp(t + s, t, y) for s, y in zip(shifts_s, maneuver.outputs.T, strict=True)]
+    if maneuver.sampled is None:
+        return replace(maneuver, outputs=np.column_stack(columns))
+    sampled = np.ones_like(maneuver.sampled)
+    for j, steps in enumerate(np.round(shifts_s / maneuver.dt_s).astype(np.int64)):
+        if not maneuver.sampled[:, j].all():
+            before = rows + steps
+            known = (before >= 0) & (before < len(rows))
+            sampled[:, j] = known & maneuver.sampled[np.where(known, before, 0), j]
+    return replace(maneuver, outputs=np.column_stack(columns), sampled=sampled)
