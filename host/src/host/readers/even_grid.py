@@ -4,7 +4,7 @@ samples, lines over gaps.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -166,7 +166,9 @@ def _grid(rows: _Instants, dt_s: float, notes: list[str]) -> Array:
     return np.asarray(t[0] + dt_s * np.arange(count))
 
 
-def even_grid(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
+def even_grid(
+    columns: dict[str, Array], notes: list[str], fitted: Collection[str] = FITTED
+) -> dict[str, Array]:
     """Bring the table to an even grid, unwrap angles once, draw curves between slow samples and
     lines over gaps.
 
@@ -201,7 +203,7 @@ def even_grid(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
             result[name] += _bent(grid, own, series)
         if steps.get(name, 0.0) > 1.5 * dt_s:
             result[sampled_name(name)] = _at_instants(grid, own.t)
-        if name in FITTED and len(own.t) < len(rows.t):
+        if name in fitted and len(own.t) < len(rows.t):
             bridged |= _over(grid, own)
             longest = int(np.argmax(own.gaps))
             if own.gaps[longest] > max(own.long_s, 1.01 * longest_step_s):

@@ -14,9 +14,10 @@ import pandas as pd
 import pytest
 from host.cli import main
 from host.readers.even_grid import USED
-from host.sysid.checks import CHECKS
+from host.sysid.checks import CHECKS, Finding, blamed
 from host.sysid.flight import read_flight_columns
 
+import host
 from tests.host.readers.autopilot_flights import write
 
 SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad")
@@ -41,6 +42,11 @@ def stuck(x: pd.DataFrame) -> pd.DataFrame:
     return x.assign(alpha_rad=values)
 
 
+def exchanged(x: pd.DataFrame) -> pd.DataFrame:
+    """Aileron and rudder under each other's name."""
+    return x.assign(aileron_rad=x["rudder_rad"], rudder_rad=x["aileron_rad"])
+
+
 def climbing(x: pd.DataFrame) -> pd.DataFrame:
     """A height that falls while the vertical speed says that it climbs."""
     phase = x["t_s"] / 2.0
@@ -53,6 +59,7 @@ OF_COLUMNS: dict[str, tuple[str, Change]] = {
     "surface-size": ("elevator_rad", times("elevator_rad", 40.0)),
     "surface-idle": ("elevator_rad", times("elevator_rad", 1e-3)),
     "surface-sign": ("elevator_rad", times("elevator_rad", -1.0)),
+    "surface-exchanged": ("aileron_rad", exchanged),
     "gravity": ("az_mps2", times("az_mps2", -1.0)),
     "airspeed-sign": ("airspeed_mps", times("airspeed_mps", -1.0)),
     "static-pressure": ("static_pa", times("static_pa", 0.01)),
@@ -71,7 +78,7 @@ OF_COLUMNS: dict[str, tuple[str, Change]] = {
     "stuck-sensor": ("alpha_rad", stuck),
 }
 LATER = {
-    "small-inputs", "feedback", "flow-angles", "calibration", "sensor-agreement", "surface-rate",
+    "small-inputs", "feedback", "flow-angles", "calibration", "surface-rate",
     "instrument-errors", "airspeed-scale", "time-digits",
 }  # fmt: skip
 
@@ -125,10 +132,49 @@ OF_TABLES: dict[str, Change] = {
     "feedback": lambda x: x.assign(rudder_rad=0.4 * x["r_radps"]),
     "flow-angles": lambda x: x.drop(columns="alpha_rad"),
     "calibration": lambda x: x.assign(q_radps=x["q_radps"] + 0.15),
-    "sensor-agreement": lambda x: x.assign(
-        p_radps=x["p_radps"] + 0.3, q_radps=1.1 * x["q_radps"] + 0.2
-    ),
 }
+
+
+def test_a_search_that_did_not_converge_accuses_no_sensor(record: pd.DataFrame) -> None:
+    """It says that it stopped, and that a sensor is off is nobody's to say then."""
+    off = {"p_radps": record["p_radps"] + 0.3, "q_radps": 1.1 * record["q_radps"] + 0.2}
+    found = host.identify(record.assign(**off), models=["short-period", "dutch-roll"])
+    assert found.agreements == (None,)
+    assert any("the search did not converge" in note for note in found.notes)
+    assert not {f.check for f in found.findings} & {"calibration", "sensor-agreement"}
+
+
+def test_a_column_that_no_equation_uses_cuts_and_accuses_nothing(record: pd.DataFrame) -> None:
+    """A bank angle that sticks is none of the short period's business."""
+    table = record.copy()
+    busiest = int(np.argmax(np.abs(np.gradient(table["phi_rad"]))))
+    table.loc[busiest - 100 : busiest + 100, "phi_rad"] = table["phi_rad"].iloc[busiest - 100]
+    cut = read_flight_columns(table)
+    assert [(f.check, f.channels) for f in cut.findings] == [("stuck-sensor", ("phi_rad",))]
+    assert cut.columns["bridged"].any()
+    read = ("alpha_rad", "q_radps", "elevator_rad")
+    whole = read_flight_columns(table, equations=read)
+    kept, notes = blamed(whole.findings, read)
+    assert kept == []
+    assert all(note.startswith("no equation uses phi_rad") for note in notes)
+    assert "bridged" not in whole.columns
+
+
+def test_blame_is_for_columns_that_an_equation_uses() -> None:
+    both = Finding("theta-against-q", ("theta_rad", "q_radps"), "theta_rad moves twice as fast")
+    other = Finding("phi-against-p", ("phi_rad", "p_radps"), "phi_rad moves twice as fast")
+    kept, notes = blamed([both, other], ("q_radps",))
+    assert [f.channels for f in kept] == [("q_radps",)]
+    assert notes == ["no equation uses phi_rad, p_radps: phi_rad moves twice as fast"]
+    assert blamed([both, other], ()) == ([both, other], [])
+
+
+def test_a_table_without_air_says_so(record: pd.DataFrame) -> None:
+    air = [name for name in ("density_kgpm3", "altitude_m", "static_pa") if name in record]
+    assert air
+    said = read_flight_columns(record.drop(columns=air)).notes
+    assert any(note.startswith("density is not known") for note in said)
+    assert not any("density" in note for note in read_flight_columns(record).notes)
 
 
 @pytest.mark.parametrize("check", OF_TABLES)

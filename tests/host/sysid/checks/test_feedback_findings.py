@@ -73,7 +73,7 @@ def test_wash_out_and_lag_are_named_too(seed: int) -> None:
     assert "a wash-out of " in both.text
     assert both.feedback is not None
     assert both.feedback.filtered
-    assert both.done.startswith("only what they do together is told")
+    assert both.done.startswith("only what they do together is known")
 
 
 def test_two_signals_are_named() -> None:
@@ -96,7 +96,7 @@ def test_a_bank_loop_whose_command_jumps_is_named_and_takes_nothing(seed: int) -
     assert found.text.startswith("aileron_rad follows phi_rad and p_radps at ")
     assert found.text.endswith(" legs of constant command")
     assert found.feedback is None
-    assert "its derivatives are as their intervals say" in found.done
+    assert "derivatives keep their marks" in found.done
     # The same steps by a pilot, small enough for a flight without a law.
     inputs["aileron_rad"] = 0.1 * steps
     assert found_in(flown("lateral", inputs, None, seed)) == []

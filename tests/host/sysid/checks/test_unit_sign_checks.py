@@ -9,6 +9,7 @@ import pytest
 from host.cli import main
 from host.readers.column_map import UNITS
 from host.sysid.checks import CHECKS, Finding, checked, open_channels
+from host.sysid.checks.side_force import unlikely_factors
 from host.sysid.checks.unit_sign_checks import SURFACES, check
 from host.sysid.flight import read_columns
 from studies.foreign.flight import Air, fly
@@ -300,6 +301,35 @@ def test_a_doubt_that_another_column_explains_is_none() -> None:
     np.testing.assert_allclose(columns["alpha_rad"], right["alpha_rad"], rtol=1e-9)
     assert "airspeed_mps" not in open_channels(findings)
     assert "alpha_rad" in open_channels(findings)
+
+
+def test_exchanged_aileron_and_rudder_are_named(flights: dict[str, Columns]) -> None:
+    """Each drives the rate of the other: both stood in the list of what stays silent."""
+    for card, flown in flights.items():
+        (found,) = check(swapped("aileron_rad", "rudder_rad")(flown))
+        assert found.check == "surface-exchanged", card
+        assert found.channels == ("aileron_rad", "rudder_rad")
+        assert check(flown) == [], card
+
+
+def test_accelerations_without_weight_are_not_read_in_g(flight: Columns) -> None:
+    """In a turn their median is about 1 m/s2, as that of a load factor is."""
+    free = flight["az_mps2"] + 9.80665
+    changed = flight | {"az_mps2": free - float(np.median(free)) - 1.0}
+    _, findings = checked(changed)
+    assert not any("mps2 in g" in f.done for f in findings)
+    _, findings = checked(times("az_mps2", 1 / 9.80665)(flight))
+    assert any("az_mps2 in g" in f.done for f in findings)
+
+
+def test_an_unusual_side_force_alone_is_no_other_unit() -> None:
+    """A Zagi's is a fiftieth of lift, an Aerosonde's over a quarter: neither is in ft/s2."""
+    t = np.arange(0.0, 20.0, 0.1)
+    for share in (0.02, 0.03, 0.19, 0.28):
+        means = {"alpha_rad": np.sin(t), "az_mps2": -100.0 * np.sin(t),
+                 "beta_rad": np.cos(t), "ay_mps2": -100.0 * share * np.cos(t)}  # fmt: skip
+        unlikely = unlikely_factors(means, (1.0, 1.0 / 3.28084, 3.28084, 9.80665))
+        assert unlikely[1.0] - min(unlikely.values()) < 2.0, share  # half a deviation and more
 
 
 def faults(flight: Columns) -> Iterator[tuple[str, Columns]]:

@@ -36,7 +36,7 @@ def test_surfaces_that_the_transmitter_mixes_are_not_told_apart(
     assert left_out or {"L_da", "L_dr", "N_da", "N_dr"} <= refused
     mixed = "  aileron_rad and rudder_rad moved together: fly one at a time"
     assert any(line.startswith(mixed) for line in verdict_lines([answer], []))
-    [trusted] = [line for line in verdict_lines([answer], []) if "trust (" in line]
+    [trusted] = [line for line in verdict_lines([answer], []) if "good (" in line]
     assert "L_p" in trusted
     assert "_da" not in trusted
     assert "_dr" not in trusted

@@ -63,9 +63,9 @@ def flown(kind: str, seed: int = 4) -> Maneuver:
 @pytest.mark.parametrize(
     ("kind", "method", "words"),
     [
-        ("white", "output-error-white", "white, it has no memory"),
+        ("white", "output-error-white", "white, for residuals are not coloured"),
         ("coloured", "output-error", "coloured noise (BIC"),
-        ("gust", "filter-error-gust", "gust (BIC"),
+        ("gust", "filter-error-gust", "gusts (BIC"),
     ],
 )
 def test_the_noise_of_the_data_chooses_the_method_and_it_is_said(

@@ -39,6 +39,7 @@ def model_lines(answer: Answer, verdict: Verdict) -> list[str]:
         mark = verdict.marks.get(name, "")
         share = f"{100.0 * float(half[k]) / max(float(size[k]), 1e-300):.0f} %" if mark else ""
         known = f"{share} {word_of(mark)}" if mark else ""
+        known = "at its bound" if name in answer.at_bound else known
         called = "" if answer.own_model else in_words(name)
         lines.append(
             _line(

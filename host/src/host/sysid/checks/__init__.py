@@ -17,7 +17,7 @@ if TYPE_CHECKING:
         finding_document,
         open_channels,
     )
-    from host.sysid.checks.finding_consequences import checked
+    from host.sysid.checks.finding_consequences import blamed, checked
     from host.sysid.checks.kinematic_checks import consistent
     from host.sysid.checks.unit_sign_checks import check
 
@@ -26,6 +26,7 @@ __all__ = [
     "Feedback",
     "Finding",
     "accepted_checks",
+    "blamed",
     "calibration_findings",
     "check",
     "check_lines",
@@ -42,6 +43,7 @@ __getattr__ = lazily(
         "Feedback": "data_finding",
         "Finding": "data_finding",
         "accepted_checks": "data_finding",
+        "blamed": "finding_consequences",
         "calibration_findings": "agreement_findings",
         "check": "unit_sign_checks",
         "check_lines": "data_finding",

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-
 from host.sysid.checks.data_finding import Finding
 from host.sysid.reconstruction.calibration_consistency import (
     ALL,
@@ -14,7 +12,6 @@ from host.sysid.reconstruction.reconstruction import Compatibility
 
 RATES = ("p_radps", "q_radps", "r_radps")
 FORCES = ("ax_mps2", "ay_mps2", "az_mps2")
-AIR_DATA = ("airspeed_mps", "alpha_rad", "beta_rad")
 # The columns that a group of errors of an instrument's file moves.
 MOVED = {
     "gyro": RATES,
@@ -38,10 +35,3 @@ def calibration_findings(agreement: Compatibility) -> list[Finding]:
     causes = ("a calibration that is another instrument's", "wind that changes", "a wrong unit")
     done = "intervals rest on the file all the same"
     return [Finding("calibration", tuple(dict.fromkeys(channels)), lines[0], causes, done)]
-
-
-def disagreement(error: Exception, columns: Collection[str]) -> Finding:
-    """Return the finding that reconstruction brought the sensors to no agreement."""
-    channels = tuple(k for k in AIR_DATA if k in columns)
-    causes = ("a unit", "a sensor that is stuck or late", "wind that changes")
-    return Finding("sensor-agreement", channels, str(error), causes, "no error was estimated")

@@ -25,6 +25,7 @@ CHECKS = {
     "angle-size": "angles in flight are below pi",
     "surface-size": "surfaces stay within 90 deg",
     "surface-idle": "a surface moves by more than the width of a line",
+    "surface-exchanged": "a surface drives its own rate more than another's",
     "surface-sign": "a surface turns the aircraft the way our signs say",
     "gravity": "specific force is about 9.8 m/s2, and az points down",
     "airspeed-sign": "airspeed is above zero",
@@ -50,7 +51,6 @@ CHECKS = {
     "airspeed-scale": "airspeed is, within its file, what forces and wind angles say",
     "calibration": "sensor errors are as small as their file says",
     "feedback": "a surface moves by itself, and is no function of what the aircraft does",
-    "sensor-agreement": "flight-path reconstruction brings the sensors together",
 }
 AS_IT_IS = "used as it is"
 HINT = "give its unit or sign in the map (argument mapping)"

@@ -49,6 +49,9 @@ LABEL = {
     "alpha_rad": "alpha", "beta_rad": "beta", "p_radps": "p", "q_radps": "q", "r_radps": "r",
 }  # fmt: skip
 CAUSES = {"rudder_rad": ("a yaw damper", "an autopilot"), "": ("an autopilot", "a stabiliser")}
+# Of all windows: several times the memory of a law (a delay of 0.4 s, a lag of 0.3 s). In 2.5 s of
+# hand flying a stick is a function of some state by chance.
+LEAST_S = 4.0
 LEAST_LAG_S = 0.05  # a shorter one looks like a delay
 
 
@@ -124,7 +127,9 @@ def _windows(
             inside |= (t >= first) & (t <= item.fit_window()[1])
     inside &= ~(columns.get("bridged", np.zeros(len(t))) > 0.0)
     windows = [w for w in runs_of(inside) if len(w) >= FEWEST]
-    if not windows or float(np.std(columns[surface][np.concatenate(windows)])) < STILL_RAD:
+    if sum(map(len, windows)) * _period_s(columns) < LEAST_S:
+        return []
+    if float(np.std(columns[surface][np.concatenate(windows)])) < STILL_RAD:
         return []
     return windows
 

@@ -59,6 +59,30 @@ def checked(
     return result, [*settled, *accepted]
 
 
+def blamed(
+    findings: Sequence[Finding], equations: Collection[str]
+) -> tuple[list[Finding], list[str]]:
+    """Return the findings about columns that a model reads, and notes on those that it does not.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+    equations : collection of str
+        Columns that a model reads; empty: it may be any.
+    """
+    kept, notes = [], []
+    for f in findings:
+        own = tuple(name for name in f.channels if name in equations)
+        surface = f.feedback.surface if f.feedback else ""
+        if not equations or (not f.channels and (not surface or surface in equations)):
+            kept.append(f)
+        elif own:
+            kept.append(replace(f, channels=own))
+        else:
+            notes.append(f"no equation uses {', '.join(f.channels) or surface}: {f.text}")
+    return kept, notes
+
+
 def _settled(asked: Sequence[Finding], reading: Reading, left: Sequence[Finding]) -> list[Finding]:
     """Return the findings that a reading settles, with what was done."""
     remain = {(f.check, f.channels) for f in left}

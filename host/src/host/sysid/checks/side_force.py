@@ -15,7 +15,8 @@ import numpy as np
 from host.arrays import Array
 from host.sysid.checks.identity_factors import correlation
 
-USUAL_SHARE, SPREAD = 0.1, 0.7  # of lift; of its logarithm, one deviation
+USUAL_SHARE = 0.1  # of lift
+SPREAD = 1.2  # of its logarithm: root mean square of the four aircraft above about a tenth
 LEAST_CORRELATION = 0.5  # of a force with its angle: with less the angle is not what makes it
 
 

@@ -23,6 +23,8 @@ DOUBTFUL_RAD = 1.0  # of such an angle in flight, and of a surface at any moment
 NUMERICAL_RAD = 1e-9  # that a simulation moves one by that nobody moved
 IDLE_RAD = 0.0035  # a surface that swings less between its ends excites nothing
 SIGN_DEVIATIONS = 10.0  # deviations
+EXCHANGED_DEVIATIONS = 3.0  # of both surfaces, where chance alone would be one in a million
+RATES = ("p_radps", "q_radps", "r_radps")
 WITHOUT_GRAVITY = 0.5  # of the size: with less along z, weight is not in it
 DENSITY = (0.4, 1.6)
 STATIC_PA = (2e4, 1.2e5)
@@ -51,7 +53,7 @@ def check(columns: Mapping[str, Array]) -> list[Finding]:
     findings = [*_angles(flown), *_gravity(flown), *_air(flown), *_surface_sizes(flown)]
     means = block_means(flown, max(1, round(BLOCK_S / dt_s)))
     if len(means["t_s"]) >= FEWEST:
-        findings += [*_forces(means), *_surfaces(means)]
+        findings += [*_forces(means), *_surfaces(means), *_exchanged(means)]
     weighed = not any(f.check == "gravity" for f in findings)
     return _unique_findings([*findings, *consistent(flown, dt_s, weighed=weighed)])
 
@@ -116,6 +118,10 @@ def _gravity(flown: Mapping[str, Array]) -> list[Finding]:
     size = float(np.median(np.sqrt(sum(flown[k] ** 2 for k in names))))
     down = float(np.median(flown["az_mps2"]))
     weighed = (abs(down), size if abs(down) > WITHOUT_GRAVITY * size else 0.0)
+    # Weight is always there, lift changes about it: of accelerations without it nothing is steady.
+    low, high = np.quantile(flown["az_mps2"], (0.25, 0.75))
+    if float(high - low) > WITHOUT_GRAVITY * abs(down):
+        weighed = (0.0, 0.0)
     for unit, one in (("g", 1.0), ("ft/s2", GRAVITY_MPS2 / 0.3048), ("mg", 1000.0)):
         if any(0.7 * one < found < 1.4 * one for found in weighed):
             text = f"az_mps2 is {down:.3g} m/s2 in the median of the flight, not -9.8"
@@ -200,3 +206,40 @@ def _surfaces(means: Mapping[str, Array]) -> list[Finding]:
             causes = (f"the other sign: {HINT}", "feedback", "a canard")
             findings.append(Finding("surface-sign", (surface,), text, causes))
     return findings
+
+
+def _exchanged(means: Mapping[str, Array]) -> list[Finding]:
+    """Hold each surface against the rate that another one should drive.
+
+    A mixer or a dihedral lets a surface drive two rates. Of two columns each of which drives the
+    other's rate more than its own, one stands under the other's name.
+    """
+    names = [s for s in SURFACES if s in means and SURFACES[s][0] in means]
+    found = []
+    for k, one in enumerate(names):
+        for other in names[k + 1 :]:
+            pair = (one, other)
+            ahead = [_ahead(means, SURFACES[own][0], own, pair) for own in pair]
+            if all(deviations < -EXCHANGED_DEVIATIONS for deviations in ahead):
+                text = f"{one} drives what {other} should, and {other} what {one} should"
+                causes = (f"two columns exchanged: {HINT}",)
+                found.append(Finding("surface-exchanged", pair, text, causes))
+    return found
+
+
+def _ahead(means: Mapping[str, Array], rate: str, own: str, pair: tuple[str, str]) -> float:
+    """Return by how many deviations a surface drives its rate more than the other one does."""
+    other = pair[1] if own == pair[0] else pair[0]
+    if any(np.ptp(means[s]) < IDLE_RAD for s in pair):
+        return 0.0
+    beside = [means[s] for s in ("alpha_rad", "beta_rad", *RATES) if s in means]
+    left = np.gradient(means[rate], means["t_s"])
+    X = np.column_stack([means[own], means[other], *beside, np.ones(len(left))])
+    size = np.maximum(np.abs(X).max(axis=0), 1e-12)
+    beta, *_ = np.linalg.lstsq(X / size, left, rcond=None)
+    beta = beta / size
+    spread = float(np.sum((left - X @ beta) ** 2)) / max(len(left) - X.shape[1], 1)
+    inverse = np.linalg.pinv((X / size).T @ (X / size)) / np.outer(size, size)
+    signs = np.array([np.sign(beta[0]), -np.sign(beta[1])])
+    variance = float(signs @ inverse[:2, :2] @ signs) * spread
+    return float((abs(beta[0]) - abs(beta[1])) / np.sqrt(max(variance, 1e-300)))

@@ -97,6 +97,7 @@ def read_flight_columns(
     *,
     calibration: Path | None = None,
     also: Collection[str] = (),
+    equations: Collection[str] = (),
     accept: Collection[str] = (),
     sensors: Mapping[str, int | str] | None = None,
     row_rate_hz: float | None = None,
@@ -114,6 +115,8 @@ def read_flight_columns(
         Calibration of a log; the default one without.
     also : collection of str
         Signals of a model of one's own, beside those that are always looked for.
+    equations : collection of str
+        Columns that a model reads: what others miss divides no maneuver. Empty: it may be any.
     accept : collection of str
         Checks whose findings change nothing: the columns are used as they are.
     sensors : mapping of str to int, optional
@@ -154,7 +157,7 @@ def read_flight_columns(
     from host.sysid.flight.table_columns import table_columns  # checks that our log needs not
 
     found.columns = raw = {}  # what is used of them is known
-    columns, findings, resolution = table_columns(used, found, source, called, accept)
+    columns, findings, resolution = table_columns(used, found, source, called, accept, equations)
     return FlightColumns(
         columns | derived_columns(columns, wanted),
         notes,

@@ -19,11 +19,17 @@ from host.sysid.checks.finding_consequences import checked
 from host.sysid.checks.measured import Measured, measured
 from host.sysid.checks.unit_sign_checks import SURFACES
 
+AIR = ("density_kgpm3", "altitude_m", "static_pa")  # any of them tells the density
 SENSORS = tuple(name for name in FITTED if name not in SURFACES)  # a command may well stand still
 
 
 def table_columns(
-    used: dict[str, Array], found: Foreign, source: Any, called: str, accept: Collection[str]
+    used: dict[str, Array],
+    found: Foreign,
+    source: Any,
+    called: str,
+    accept: Collection[str],
+    equations: Collection[str] = (),
 ) -> tuple[dict[str, Array], list[Finding], dict[str, float]]:
     """Return columns on an even grid, findings, and the step of each quantised column.
 
@@ -38,13 +44,21 @@ def table_columns(
         Where it was read from.
     accept : collection of str
         Checks whose findings change nothing.
+    equations : collection of str
+        Columns that a model reads; empty: it may be any.
     """
     timing: list[Finding] = []
+    if not set(AIR) & used.keys():
+        found.notes.append(
+            "density is not known, for density_kgpm3, altitude_m and static_pa are missing:"
+            " coefficients take that of sea level"
+        )
     if not found.shares:  # a table: an autopilot's log is read clock by clock
         used = _timed(used, source, called, found.notes, timing, accept)
-    seen = _measured(used, found.notes, accept)
+    fitted = [name for name in FITTED if not equations or name in equations]
+    seen = _measured(used, found.notes, accept, fitted)
     used.clear()
-    even = even_grid(seen.columns, found.notes)
+    even = even_grid(seen.columns, found.notes, fitted)
     columns, findings = checked(even, accept)
     slow = _slow_outputs(found.slow_outputs)
     resolution = _resolutions(seen.sampling, even, columns)
@@ -80,12 +94,15 @@ def _timed(
     return columns if found.accepted else columns | {"t_s": t_s}
 
 
-def _measured(columns: dict[str, Array], notes: list[str], accept: Collection[str]) -> Measured:
+def _measured(
+    columns: dict[str, Array], notes: list[str], accept: Collection[str], fitted: Collection[str]
+) -> Measured:
     """Return the rows that are used, in order, what was not measured as missing, and findings."""
     index = rows_in_order(columns["t_s"], notes)
+    sensors = [name for name in SENSORS if name in fitted]
     if len(index) < len(columns["t_s"]) or np.any(np.diff(index) != 1):
         columns = {k: v[index] for k, v in columns.items()}
-    found = measured(columns, SENSORS, LONGEST_GAP_S, accept)
+    found = measured(columns, sensors, LONGEST_GAP_S, accept)
     notes += found.notes
     return found
 

@@ -108,6 +108,7 @@ def read_flight(source: Source, how: ReadingOptions, known: AircraftData | None)
         how.mapping,
         calibration=how.calibration,
         also=how.also,
+        equations=how.equations,
         accept=how.accept,
         sensors=dict(how.sensors),
         row_rate_hz=how.row_rate_hz,

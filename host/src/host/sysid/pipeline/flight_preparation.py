@@ -15,10 +15,11 @@ from host.instrument.recording_notes import recording_notes
 from host.instrument.servo_prior import servo_prior
 from host.physical.calibration import load_calibration
 from host.sysid.aerodynamics.measured_thrust import with_thrust
-from host.sysid.checks.agreement_findings import calibration_findings, disagreement
+from host.sysid.checks.agreement_findings import calibration_findings
 from host.sysid.checks.airspeed_scale import airspeed_scale_findings
 from host.sysid.checks.data_finding import Finding
 from host.sysid.checks.feedback_findings import feedback_findings
+from host.sysid.checks.finding_consequences import blamed
 from host.sysid.checks.hidden_angles import no_instrument_errors_finding, no_vanes_finding
 from host.sysid.checks.small_inputs import whole_flight
 from host.sysid.flight.column_change import change_of
@@ -109,6 +110,7 @@ def prepare(given: FlightAtHand) -> PreparedFlight:
         *no_vanes_finding(columns, reconstructed=reconstructed),
         *(airspeed_scale_findings(flight.corrected, instrument) if instrument else ()),
     ]
+    findings, unused = blamed(findings, how.equations)
     flight = replace(
         flight,
         corrected=corrected,
@@ -127,7 +129,8 @@ def prepare(given: FlightAtHand) -> PreparedFlight:
             *change_of(flight.corrected, corrected, "thrust added", "measured, or of the power"),
         ),
     )
-    said = (*read.notes, *travel, *open_notes, *overlap_notes(how.stretches), *agreed.notes, *line)
+    given_twice = overlap_notes(how.stretches)
+    said = (*read.notes, *travel, *open_notes, *given_twice, *agreed.notes, *line, *unused)
     return PreparedFlight(flight, agreed.found, said, agreed.unchecked)
 
 
@@ -165,7 +168,7 @@ def _agreement(
         found = reconstruct(columns, known.airframe if known else None, instrument, sensors)
     except NoAgreementError as error:
         alone = by_calibration_alone(instrument) if instrument and how.corrections else None
-        return _Agreement(None, alone, (disagreement(error, columns),))
+        return _Agreement(by_calibration=alone, unchecked=(str(error),))
     except IdentificationError as error:
         unknown = (no_instrument_errors_finding(columns),) if given.read.shares else ()
         return _Agreement(findings=unknown, unchecked=(str(error),))

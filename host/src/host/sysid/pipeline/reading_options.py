@@ -34,6 +34,8 @@ class ReadingOptions:
         Estimate residual delays, and places of sensors that no aircraft file gives.
     also : tuple of str
         Signals to read beside those that are always read.
+    equations : tuple of str
+        Columns that a model reads: others cut and change nothing. Empty: it may be any.
     accept : frozenset of str
         Checks whose findings change nothing.
     sensors : tuple of (message, instance)
@@ -49,6 +51,7 @@ class ReadingOptions:
     corrections: bool = True
     delays: bool = True
     also: tuple[str, ...] = ()
+    equations: tuple[str, ...] = ()
     accept: frozenset[str] = frozenset()
     sensors: tuple[tuple[str, int | str], ...] = ()
     row_rate_hz: float | None = None
@@ -65,6 +68,7 @@ def reading_options(
     corrections: bool = True,
     delays: bool = True,
     also: tuple[str, ...] = (),
+    equations: tuple[str, ...] = (),
     accept: str | Iterable[str] = (),
     sensors: Mapping[str, int | str] | None = None,
     row_rate_hz: float | None = None,
@@ -79,6 +83,8 @@ def reading_options(
         From and to of one stretch of every flight, s.
     also : tuple of str
         Signals to read beside those that are always read.
+    equations : tuple of str
+        As `ReadingOptions` has them.
 
     Raises
     ------
@@ -94,6 +100,7 @@ def reading_options(
             corrections,
             delays,
             also,
+            equations,
             accepted_checks(listed(accept)),
             tuple((sensors or {}).items()),
             row_rate_hz,

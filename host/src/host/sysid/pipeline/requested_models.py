@@ -69,6 +69,14 @@ class Models:
         own = {s for _, m in self.linear if m is not None for s in m.signals()}
         return tuple(sorted({*own, *THRUST_COLUMNS}))
 
+    @property
+    def equations(self) -> tuple[str, ...]:
+        """Columns that models of the user's own read; empty where others are fitted too."""
+        if self.coefficients is not None or any(m is None for _, m in self.linear):
+            return ()
+        own = {s for _, m in self.linear if m is not None for s in m.signals()}
+        return tuple(sorted({*own, "airspeed_mps"}))
+
 
 def requested_models(given: ModelName | Iterable[ModelName] | None) -> Models:
     """Return the requested models; the two four-state ones by default.

@@ -135,6 +135,7 @@ def identify(
         corrections=corrections,
         delays=delays,
         also=asked.signals,
+        equations=asked.equations if aircraft is None else (),
         accept=accept,
         sensors=sensors,
         row_rate_hz=row_rate_hz,

@@ -59,7 +59,7 @@ NOT_EXCITED_NO_GPS = "attitude and gusts do not show it without GPS; the calibra
 
 
 class NoAgreementError(IdentificationError):
-    """Error: no errors within reach of the calibration make the sensors agree."""
+    """Error: the search for the sensors' errors did not converge, which says nothing of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,8 +149,8 @@ def reconstruct(
     fit = fit_path(problem, lagged_inputs if vanes else [x[:, :0] for x in lagged_inputs])
     if not fit.converged:
         raise NoAgreementError(
-            f"data compatibility: no agreement after {fit.iterations} iterations; a sensor is"
-            " further off than its calibration allows"
+            "data compatibility: sensors could not be compared, the search did not converge in"
+            f" {fit.iterations} iterations"
         )
     gps = GPS[0] in problem.model.outputs
     count = len(problem.common)
