@@ -108,7 +108,9 @@ def test_frequency_responses_are_drawn_with_their_band_and_warn_of_feedback(
     own = pairs_of(replace(answer, maneuvers=tuple(flown), held_out_runs=()))[0]
     assert np.median(np.abs(np.log(own[0].recorded / own[0].model))) < 0.05
     words = save(figures[0], tmp_path / "bode.svg").read_text()
-    assert method in words and "elevator to az, m/s2 per deg" in words
+    title = figures[0].get_suptitle()
+    assert method in " ".join(title.split()) and "elevator to az, m/s2 per deg" in words
+    assert max(map(len, title.splitlines())) < 100  # both ends ran out of the picture
     assert any("controller's inverse" in line for line in lines) and "controller" in words
     assert not any("inverse" in line for line in frequency_pictures([answer])[1])
     still = replace(answer, maneuvers=(_short(answer.maneuvers[0]),), held_out_runs=())

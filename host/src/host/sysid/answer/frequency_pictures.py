@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,10 +35,12 @@ ACROSS = 4  # pairs side by side
 TICKS_HZ = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 ABOUT = (
     f"dots: the record, dark where its coherence is above {COHERENT:g}; red: the model with its"
-    " 95 % interval; green dashes: an autotune; shaded: the band where coherence holds"
+    " 95 % interval; shaded: the band where coherence holds"
 )
+TUNED_ABOUT = "green: an autotune with its 95 % interval"
+LETTERS_PER_IN = 14  # of a title
 DECIBEL = 20.0 / np.log(10.0)
-Curve = tuple[Array, NDArray[np.complexfloating]]
+Curve = tuple[Array, NDArray[np.complexfloating], NDArray[np.complexfloating]]
 
 
 def frequency_pictures(
@@ -82,7 +85,7 @@ def frequency_pictures(
 def opinions_of(pair: Pair, opinions: Sequence[Opinion]) -> tuple[Curve, ...]:
     """Return what autotunes say of a pair, over its surface."""
     return tuple(
-        (one.frequency_hz, one.theirs / one.surface_per_torque)
+        (one.frequency_hz, one.theirs / one.surface_per_torque, one.half_width)
         for one in opinions
         if (one.tuned.rate, one.input) == (pair.output, pair.input)
     )
@@ -92,7 +95,7 @@ def opinions_of(pair: Pair, opinions: Sequence[Opinion]) -> tuple[Curve, ...]:
 class Pair:
     """One output over one input, (f,) each; `half_width` as `ModelResponse` has it.
 
-    `opinions` are those of autotunes: frequencies, and the response to the surface.
+    `opinions` are those of autotunes: frequencies, the response to the surface, and its half-width.
     """
 
     output: str
@@ -179,7 +182,8 @@ def frequency_figure(pairs: Sequence[Pair], title: str) -> Figure:
     """Draw magnitude, phase and coherence of each pair; the coherent band is shaded."""
     across = min(ACROSS, len(pairs))
     blocks = -(-len(pairs) // across)
-    figure = empty_figure((max(3.2 * across, 5.0), 5.2 * blocks + 0.4))
+    width_in = max(3.2 * across, 5.0)
+    figure = empty_figure((width_in, 5.2 * blocks + 0.4))
     heights = [3, 2, 1.4] * blocks
     panels = figure.subplots(3 * blocks, across, squeeze=False, height_ratios=heights)
     shown_pairs = [_as_shown(pair) for pair in pairs]
@@ -189,8 +193,10 @@ def frequency_figure(pairs: Sequence[Pair], title: str) -> Figure:
     for k in range(len(pairs), blocks * across):
         for axis in panels[3 * (k // across) : 3 * (k // across) + 3, k % across]:
             axis.set_visible(False)
-    figure.suptitle(title, fontsize=9)
-    figure.supxlabel(ABOUT, fontsize=8)
+    about = ABOUT + (f"; {TUNED_ABOUT}" if any(pair.opinions for pair in pairs) else "")
+    fitting = [fill(line, int(LETTERS_PER_IN * width_in)) for line in (*title.splitlines(), about)]
+    figure.suptitle("\n".join(fitting[:-1]), fontsize=9)
+    figure.supxlabel(fitting[-1], fontsize=8)
     return figure
 
 
@@ -207,12 +213,16 @@ def _draw(axes: Any, pair: Pair, *, first: bool) -> None:
     coherent, band = pair.coherence > COHERENT, pair.band_hz
     phase = np.unwrap(np.angle(pair.model))
     beside = phase + np.angle(pair.recorded / pair.model)  # the turn that is nearest to the model
-    for their_hz, theirs in pair.opinions:
+    for their_hz, theirs, their_half in pair.opinions:
         own = np.interp(their_hz, f, phase)
         turn = own + np.angle(theirs * np.exp(-1j * own))  # that is nearest to the model
         size = DECIBEL * np.log(np.abs(scale * theirs))
-        for axis, values in ((axes[0], size), (axes[1], np.degrees(turn))):
+        for axis, values, half in (
+            (axes[0], size, DECIBEL * their_half.real),
+            (axes[1], np.degrees(turn), np.degrees(their_half.imag)),
+        ):
             axis.plot(their_hz, values, color=TUNED, lw=1.0, ls="--")
+            axis.fill_between(their_hz, values - half, values + half, color=TUNED, alpha=0.2, lw=0)
     for axis, dots, line, half in (
         (axes[0], DECIBEL * np.log(np.maximum(np.abs(scale * pair.recorded), 1e-300)),
          DECIBEL * np.log(np.abs(scale * pair.model)), DECIBEL * pair.half_width.real),
