@@ -7,10 +7,9 @@ from host.faces import lazily
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from host.sysid.aerodynamics.coefficient import Coefficient, CoefficientTable
     from host.sysid.aerodynamics.coefficient_table import (
-        Coefficient,
         CoefficientParts,
-        CoefficientTable,
         ShiftedEstimate,
         coefficient_parts,
         coefficients,
@@ -30,9 +29,9 @@ __all__ = [
 __getattr__ = lazily(
     __name__,
     {
-        "Coefficient": "coefficient_table",
+        "Coefficient": "coefficient",
         "CoefficientParts": "coefficient_table",
-        "CoefficientTable": "coefficient_table",
+        "CoefficientTable": "coefficient",
         "ShiftedEstimate": "coefficient_table",
         "coefficient_parts": "coefficient_table",
         "coefficients": "coefficient_table",

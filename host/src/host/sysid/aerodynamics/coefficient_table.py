@@ -18,37 +18,11 @@ from host.constants import NORMAL_95
 from host.instrument.deviations import dynamic_pressure_share
 from host.instrument.error_list import QBAR, conversion_cause
 from host.instrument.instrument_errors import InstrumentErrors, standard_errors
+from host.sysid.aerodynamics.coefficient import Coefficient
 from host.sysid.aerodynamics.path_thrust import PathThrust
 from host.sysid.models.consider_covariance import consider_covariance, dominant_error_source
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.templates import Trim
-
-
-@dataclass(frozen=True, slots=True)
-class Coefficient:
-    """A non-dimensional derivative: value, standard error of the fit alone, 95 % half-width with
-    everything, and what widens that most."""
-
-    name: str
-    value: float
-    fit_error: float
-    half_width: float
-    widened_by: str = ""
-
-    @property
-    def differs_from_zero(self) -> bool:
-        """Whether its interval does not reach zero."""
-        return abs(self.value) > self.half_width
-
-
-@dataclass(frozen=True, slots=True)
-class CoefficientTable:
-    """Coefficients of one kind of maneuver: ``longitudinal``, ``lateral`` or another template."""
-
-    template: str
-    method: str
-    alpha_rad: float
-    coefficients: tuple[Coefficient, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,7 @@ from host.export.atomic_files import atomic_write
 if TYPE_CHECKING:
     from host.aircraft.file import Aircraft
     from host.arrays import Array
-    from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
+    from host.sysid.aerodynamics.coefficient import Coefficient, CoefficientTable
     from host.sysid.coefficients.coefficient_fit import MeanCondition
 
 # Names of the aircraft file for the names of the answer.

@@ -10,7 +10,7 @@ from host.aircraft.gains import dimensional_name
 from host.sysid.answer.marks import MARKS, SMALL, Judged, mark_of
 
 if TYPE_CHECKING:
-    from host.sysid.aerodynamics.coefficient_table import Coefficient
+    from host.sysid.aerodynamics.coefficient import Coefficient
     from host.sysid.linear.linear_answer import Answer
 
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.aircraft.mode_names import DUTCH_ROLL, PHUGOID, ROLL, SHORT_PERIOD, SPIRAL
-from host.sysid.answer.linear_rules import unpredicted_states
 from host.sysid.answer.marks import Judged, mark_of, share_text
 from host.sysid.answer.parameter_words import NOT, word_of
 
@@ -61,6 +60,8 @@ class JudgedMode:
 def linear_modes(answer: Answer) -> list[JudgedMode]:
     """Return the modes of a linear model; not one of which a state that is not predicted takes a
     good part."""
+    from host.sysid.answer.linear_rules import unpredicted_states  # of a linear model alone
+
     failing = unpredicted_states(answer)
     return [
         _judged(mode, [failing[s] for s in _participating(answer, mode, list(failing))])

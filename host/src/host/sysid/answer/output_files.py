@@ -19,7 +19,7 @@ from host.sysid.estimators.method_registry import all_methods
 
 if TYPE_CHECKING:
     from host.arrays import Array
-    from host.sysid.aerodynamics.coefficient_table import CoefficientTable
+    from host.sysid.aerodynamics.coefficient import CoefficientTable
     from host.sysid.answer.marks import Verdict
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
     from host.sysid.linear.linear_answer import Answer

@@ -15,7 +15,7 @@ import numpy as np
 from host.aircraft.prior.prior_table import PriorTable, half_turned
 
 if TYPE_CHECKING:
-    from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
+    from host.sysid.aerodynamics.coefficient import Coefficient, CoefficientTable
 
 
 def prior_lines(tables: Sequence[CoefficientTable], prior: PriorTable) -> list[str]:

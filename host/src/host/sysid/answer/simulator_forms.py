@@ -19,7 +19,7 @@ from host.export.simulators.straight_coefficients import SURFACES, StraightCoeff
 from host.sysid.answer.aircraft_export import identified_aircraft
 
 if TYPE_CHECKING:
-    from host.sysid.aerodynamics.coefficient_table import CoefficientTable
+    from host.sysid.aerodynamics.coefficient import CoefficientTable
     from host.sysid.coefficients.coefficient_fit import MeanCondition
     from host.sysid.linear.linear_answer import Answer
 

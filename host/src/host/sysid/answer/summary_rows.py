@@ -10,7 +10,6 @@ from host.aircraft.gains import COEFFICIENT_ROWS, coefficient_name
 from host.sysid.answer.converted_marks import converted_marks
 from host.sysid.answer.parameter_words import in_words, word_of
 from host.sysid.errors.widest_errors import BESIDE, NOISE
-from host.sysid.models.diagnostics import reference_values
 from host.sysid.models.parameter_units import parameter_unit
 
 if TYPE_CHECKING:
@@ -86,6 +85,8 @@ def _direct_rows(answer: CoefficientAnswer, verdict: Verdict) -> Iterator[Summar
 
 def _linear_rows(answer: Answer, verdict: Verdict) -> Iterator[SummaryRow]:
     """Return a row for each parameter: its coefficient where it became one."""
+    from host.sysid.models.diagnostics import reference_values  # of a linear model alone
+
     result, half = answer.result, answer.result.half_width()
     size = reference_values(answer.model, answer.maneuvers, result.estimate)
     converted = converted_marks(answer, verdict.marks)

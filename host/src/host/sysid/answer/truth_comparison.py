@@ -20,7 +20,7 @@ from host.sysid.linear.model_names import AXIS_OF
 from host.sysid.models.diagnostics import reference_values
 
 if TYPE_CHECKING:
-    from host.sysid.aerodynamics.coefficient_table import CoefficientTable
+    from host.sysid.aerodynamics.coefficient import CoefficientTable
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
     from host.sysid.linear.linear_answer import Answer
     from host.sysid.models.modal_analysis import Mode

@@ -19,7 +19,7 @@ from host.constants import NORMAL_95
 from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.instrument.error_list import by_cause
-from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
+from host.sysid.aerodynamics.coefficient import Coefficient, CoefficientTable
 from host.sysid.coefficients.coefficient_fit import METHOD, CoefficientFit
 from host.sysid.coefficients.coefficient_intervals import (
     CoefficientIntervals,

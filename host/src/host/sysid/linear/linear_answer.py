@@ -7,11 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.sysid.aerodynamics.coefficient_table import (
-    Coefficient,
-    CoefficientParts,
-    CoefficientTable,
-)
+from host.sysid.aerodynamics.coefficient import Coefficient, CoefficientTable
+from host.sysid.aerodynamics.coefficient_table import CoefficientParts
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 
 if TYPE_CHECKING:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from host.aircraft.prior.prior_table import PriorTable
-    from host.sysid.aerodynamics.coefficient_table import CoefficientTable
+    from host.sysid.aerodynamics.coefficient import CoefficientTable
     from host.sysid.answer.autotune_opinion import Opinion
     from host.sysid.answer.marks import Verdict
     from host.sysid.answer.output_files import OutputPaths
