@@ -106,7 +106,11 @@ def test_the_worst_of_what_moves_it_tells_how_a_motion_is_known(found: host.Iden
     assert marked(found, M_q=CAREFUL, M_de=MARKS[-1]).axes == {"pitch": "not"}
     assert marked(found, Z_de=MARKS[-1]).axes == {"pitch": "good"}  # it moves little
     own = replace(found.linear[0], own_model=True)
-    assert "not fitted: roll, yaw" in replace(found, linear=(own,)).summary_lines()[0]
+    assert "; no roll, yaw" in replace(found, linear=(own,)).summary_lines()[0]
+
+
+def summary_of(found: host.Identification, answer: Any) -> Any:
+    return replace(found, linear=(answer,)).summary
 
 
 def test_a_wide_interval_of_noise_asks_for_larger_and_more_inputs(
@@ -129,6 +133,9 @@ def test_a_wide_interval_of_noise_asks_for_larger_and_more_inputs(
     assert advised.amplitude_deg == 5.0  # 1.5 times 3.4 deg
     # Three inputs left 1.5 times 30 %: information must grow 2.25 times, each gives 2.25 of one.
     assert advised.count == 2
+    far = tuple(replace(m, amplitude=0.3) for m in found.flights[0].maneuvers)
+    (safe,) = replace(summary_of(found, wide), flown=far).fly
+    assert safe.amplitude_deg == 10.0
     of_vane = replace(wide, causes={"M_q": "zero of the alpha vane"})
     summary = replace(found, linear=(of_vane,)).summary
     assert advised not in summary.fly

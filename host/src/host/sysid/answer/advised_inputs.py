@@ -24,6 +24,7 @@ SHOWN_IN = {"alpha": "pitch", "q": "pitch", "de": "pitch", "V": "speed and drag"
             "dr": "yaw"}  # fmt: skip
 UNITS_OF_3211 = 7
 LARGER = 1.5  # times the flown amplitude, in one step
+LARGEST_DEG = 10.0  # that is asked of a pilot: the answer is linear
 MOST = 6  # inputs of a kind: more is another flight
 PULSE_S, HANDS_OFF_S = 1.0, 20.0  # of the phugoid, of which two periods are seen
 USUAL_DEG = {"elevator": 2.0, "aileron": 3.0, "rudder": 4.0}  # as `host plan` begins
@@ -116,9 +117,10 @@ def _input(
 ) -> AdvisedInput:
     surface, kind = INPUTS[motion]
     flown = sizes.get(surface, ())
-    size = LARGER * max(flown) if flown else USUAL_DEG[surface]
+    before = max(flown, default=USUAL_DEG[surface])
+    size = min(LARGER * before, LARGEST_DEG) if flown else before
     too_wide = max((row.share / (FAIR if row.word == NOT else TRUST) for row in rows), default=1.0)
-    more = max(len(flown), 1) * (too_wide**2 - 1.0) / LARGER**2
+    more = max(len(flown), 1) * (too_wide**2 - 1.0) * (before / size) ** 2
     count = int(min(max(math.ceil(more), 1), MOST))
     return AdvisedInput(
         surface, kind, float(max(round(size), 1)), _duration_s(motion, kind, period_s), count,

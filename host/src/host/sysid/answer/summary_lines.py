@@ -74,7 +74,7 @@ def known_line(summary: AnswerSummary) -> str:
     if summary.axes:
         said = ", ".join(f"{axis} {word}" for axis, word in summary.axes.items())
         left = [axis for axis in MOVERS if axis not in summary.axes]
-        others = f"; not fitted: {', '.join(left)}" if left else ""
+        others = f"; no {', '.join(left)}" if left else ""
         return f"Known from this flight: {said}{others}."
     words = [row.word for row in summary.rows]
     said = ", ".join(f"{words.count(word)} {word}" for word in dict.fromkeys(words))
@@ -83,7 +83,7 @@ def known_line(summary: AnswerSummary) -> str:
 
 def _finding(finding: Finding) -> str:
     """Return what was found and what was done about it, in one line."""
-    done = f"; {cut(finding.done, DONE)}"
+    done = f"; {cut(finding.done.partition(' (')[0].partition(':')[0], DONE)}"
     return f"{cut(f'Finding: {finding.text}', COLUMNS - len(done))}{done}"
 
 
