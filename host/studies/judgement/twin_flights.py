@@ -9,8 +9,14 @@ from pathlib import Path
 
 from host.aircraft.file import load_measured
 from host.export.toml import dumps
-from host.instrument.instrument_errors import InstrumentErrors, instrument_errors, standard_errors
+from host.instrument.instrument_errors import (
+    InstrumentErrors,
+    errors_without_file,
+    instrument_errors,
+    standard_errors,
+)
 from host.physical.calibration import load_calibration
+from host.physical.recording import OWN
 from host.readers.even_grid import even_columns
 from host.sysid.pipeline import Identification, at_hand, identify_columns
 from host.twin.flight.fly import fly
@@ -35,7 +41,8 @@ def with_file(seed: int, models: str | None = None) -> Flown:
 
 def without_file(seed: int) -> Flown:
     """Return a flight of an instrument out of the box, of which nothing is known."""
-    return _flown(virtual_flight(CARD, seed, errors=out_of_the_box()), None)
+    told = zeroed_pitots(errors_without_file(OWN))
+    return _flown(virtual_flight(CARD, seed, errors=out_of_the_box()), None, told=told)
 
 
 def calibrated_without_file(seed: int) -> Flown:
@@ -72,15 +79,27 @@ def out_of_the_box() -> InstrumentErrors:
 
     One that is not is off by 250 Pa, more than the dynamic pressure: no airspeed is measured then.
     """
-    found = instrument_errors(load_measured(AIRCRAFT), load_calibration(), defaults=True)
-    return InstrumentErrors({**found.named, "pitot_zero_pa": standard_errors()["pitot_zero_pa"]})
+    return zeroed_pitots(
+        instrument_errors(load_measured(AIRCRAFT), load_calibration(), defaults=True)
+    )
 
 
-def _flown(flight: VirtualFlight, aircraft: str | None, models: str | None = None) -> Flown:
+def zeroed_pitots(errors: InstrumentErrors) -> InstrumentErrors:
+    """Return errors of an instrument whose pitots were zeroed at rest."""
+    return InstrumentErrors({**errors.named, "pitot_zero_pa": standard_errors()["pitot_zero_pa"]})
+
+
+def _flown(
+    flight: VirtualFlight,
+    aircraft: str | None,
+    models: str | None = None,
+    told: InstrumentErrors | None = None,
+) -> Flown:
     truth: Truth = {"first_row_s": 0.0, "maneuver": list(flight.maneuvers)}
     columns, _notes = even_columns(flight.table)
 
     def identify() -> Identification:
-        return identify_columns(at_hand(columns, aircraft=aircraft), models=models, truth=truth)
+        flight = at_hand(columns, aircraft=aircraft, errors=told)
+        return identify_columns(flight, models=models, truth=truth)
 
     return Flown(truth, identify)

@@ -14,9 +14,9 @@ from host.aircraft.file import load_measured
 from host.aircraft.mass_properties import AirframeData, Place, place
 from host.instrument.instrument_errors import (
     InstrumentErrors,
+    errors_without_file,
     instrument_errors,
     standard_errors,
-    usual_errors,
 )
 from host.physical.calibration import Calibration
 from host.physical.recording import FOREIGN, OWN, Recording
@@ -127,14 +127,11 @@ def unknown_sensors(
 ) -> SensorErrorModel:
     """Return the sensors of an aircraft without a file: typical dynamics, places at the CG.
 
-    Sensors of a recording that is not our logger's have larger errors, unless a calibration says
-    otherwise.
+    Their errors are those of `errors_without_file`.
     """
     nowhere = (0.0, 0.0, 0.0)
     recording = recording or Recording()
-    errors = usual_errors(recording.maker)
-    if calibration is not None:
-        errors = instrument_errors(None, calibration, maker=recording.maker)
+    errors = errors_without_file(recording.maker, calibration)
     return SensorErrorModel(
         nowhere, nowhere, upwash=0.1, vane_hz_per_mps=1.0, vane_damping=0.1,
         vane_friction_rad=0.0, friction_speed_mps=1.0, pitot_lag_s=0.010,
@@ -168,10 +165,16 @@ def deviations(instrument: SensorErrorModel, airframe: AirframeData) -> dict[str
         "ixx_share": airframe.inertia_share,
         "iyy_share": airframe.inertia_share,
         "izz_share": airframe.inertia_share,
-        "vane_x_m": e["place_m"].of_mean("vane_a", "vane_b"),
+        "vane_x_m": math.hypot(
+            e["place_m"].of_mean("vane_a", "vane_b"), e["vane_ahead_m"].of_mean()
+        ),
         "vane_z_m": e["place_m"].of_mean("vane_a", "vane_b"),
-        "alpha_scale": e["vane_scale"].of_mean(*VANES["alpha"]),
-        "beta_scale": e["vane_scale"].of_mean(*VANES["beta"]),
+        **{
+            f"{name}_scale": math.hypot(
+                e["vane_scale"].of_mean(*pair), e["vane_flow_share"].sigma(name)
+            )
+            for name, pair in VANES.items()
+        },
         "upwash_share": e["upwash_share"].of_mean(),
         "alpha_zero_rad": e["vane_zero_rad"].of_mean(*VANES["alpha"]),
         "pitot_scale": e["pitot_scale"].of_mean(),

@@ -15,10 +15,10 @@ from pathlib import Path
 
 from host.aircraft.file import Aircraft
 from host.errors import CalibrationError
-from host.physical.calibration import Calibration, Line
+from host.physical.calibration import Calibration, Line, load_calibration
 from host.physical.recording import OWN, SURFACES
 
-STANDARD = Path(__file__).with_name("standard.toml")
+STANDARD, NO_FILE = (Path(__file__).with_name(f"{name}.toml") for name in ("standard", "no_file"))
 UNIFORM_SD_PER_HALF_WIDTH = 1.0 / math.sqrt(3.0)  # "even" in the files
 DISTRIBUTIONS = ("even", "normal")
 DRAWN = ("instrument", "flight")
@@ -145,9 +145,39 @@ def usual_errors(maker: str) -> InstrumentErrors:
     found = dict(standard_errors().named)
     if maker == OWN:
         return InstrumentErrors(found)
+    for name, table in _of_maker(maker).items():
+        found[name] = _apply_table(found[name], table, f"{maker}.toml: [error.{name}]")
+    return InstrumentErrors(found)
+
+
+@cache
+def _of_maker(maker: str) -> Mapping[str, Mapping[str, object]]:
+    """Return the tables [error.NAME] of a maker's sensors."""
     path = Path(__file__).with_name(f"{maker}.toml")
-    for name, table in tomllib.loads(path.read_text(encoding="utf-8"))["error"].items():
-        found[name] = _apply_table(found[name], table, f"{path.name}: [error.{name}]")
+    tables: dict[str, dict[str, object]] = tomllib.loads(path.read_text(encoding="utf-8"))["error"]
+    return tables
+
+
+def errors_without_file(maker: str, calibration: Calibration | None = None) -> InstrumentErrors:
+    """Return the errors of the sensors of an aircraft of which there is no file.
+
+    Parameters
+    ----------
+    maker : str
+        Whose sensors they are (`Recording.maker`).
+    calibration : Calibration, optional
+        That made the columns, or says better. Without one sensors of our own logger are out of the
+        box.
+    """
+    if calibration is None and maker == OWN:
+        calibration = load_calibration()
+    known = instrument_errors(None, calibration, defaults=True, maker=maker)
+    found = dict(known.named)
+    stated = calibration.errors if calibration is not None else {}
+    for name, table in tomllib.loads(NO_FILE.read_text(encoding="utf-8"))["error"].items():
+        # A sensor of others is known no better by what nobody knows of it.
+        if name not in stated and (maker == OWN or name not in _of_maker(maker)):
+            found[name] = _apply_table(found[name], table, f"{NO_FILE.name}: [error.{name}]")
     return InstrumentErrors(found)
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from host.instrument.deviations import unknown_sensors
+from host.instrument.instrument_errors import instrument_errors
 from host.physical.calibration import load_calibration
 from host.physical.recording import FOREIGN, Recording
 from host.sysid.answer import TRUSTED
@@ -49,7 +52,8 @@ def test_a_deviation_of_a_scale_is_a_share_of_what_was_simulated() -> None:
     problem = OutputProblem(model, [Maneuver(0.02, u, y)])
     theta = problem.first_guess()
     theta[: problem.n_common] = [TRUTH["short-period"][p.name] for p in model.parameters]
-    sensors = unknown_sensors(Recording(maker=FOREIGN), load_calibration(SENSORS_FILE))
+    told = instrument_errors(None, load_calibration(SENSORS_FILE), maker=FOREIGN)
+    sensors = replace(unknown_sensors(Recording(maker=FOREIGN)), errors=told)
     [found] = systematic_residuals(problem, theta, [cut], [by_calibration_alone(sensors)], trim)
     assert found.shape[:2] == (len(names), 300)
     simulated = problem.outputs(theta)

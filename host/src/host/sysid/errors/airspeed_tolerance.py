@@ -21,7 +21,8 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.templates import Trim
 
-AIRSPEED = "airspeed_share"
+AIRSPEED, COLUMN = "airspeed_share", "airspeed_mps"
+STEP = 0.02  # of the airspeed: beyond it the estimate is not linear in its scale
 POSTERIOR_PRIOR_RATIO = 0.7  # below it the data tell the scale
 
 
@@ -48,11 +49,25 @@ def airspeed_shift(
     found = one_step_of(result, maneuvers, trim)
     if found is None:
         return ()
-    faster = replace(trim, airspeed_mps=trim.airspeed_mps * (1.0 + share))
-    beside = [(retrimmed(result.model, faster), maneuvers)]
-    step = found.joint(result.model, trim, maneuvers, beside, [1.0])
-    sd = float(np.sqrt(step.covariance[0, 0])) * found.widened_in(result)
-    size = sd if sd < POSTERIOR_PRIOR_RATIO else 1.0
+    step = min(STEP, share)
+    faster = replace(trim, airspeed_mps=trim.airspeed_mps * (1.0 + step))
+    beside = [(retrimmed(result.model, faster), _reading_high(result, maneuvers, step))]
+    prior = share / step
+    found_step = found.joint(result.model, trim, maneuvers, beside, [prior])
+    sd = float(np.sqrt(found_step.covariance[0, 0])) * found.widened_in(result)
+    size = sd if sd < POSTERIOR_PRIOR_RATIO * prior else prior
     # What the fit left out stays out: no deviation of a sensor brings it back.
-    shift = np.where(np.diag(result.covariance) > 0.0, size * step.by_added[0], 0.0)
+    fitted = np.diag(result.covariance) > 0.0
+    shift = np.where(fitted, size * found_step.by_added[0], 0.0)
     return (ShiftedEstimate(AIRSPEED, result.estimate + shift, 1.0, 1.0),)
+
+
+def _reading_high(
+    result: FitResult, maneuvers: Sequence[Maneuver], share: float
+) -> Sequence[Maneuver]:
+    """Return maneuvers whose measured airspeed is that share larger."""
+    outputs = result.model.outputs
+    if COLUMN not in outputs:
+        return maneuvers
+    gain = np.where(np.array(outputs) == COLUMN, 1.0 + share, 1.0)
+    return [replace(m, outputs=m.outputs * gain) for m in maneuvers]

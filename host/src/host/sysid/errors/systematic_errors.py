@@ -31,6 +31,7 @@ from host.sysid.models.templates import TEMPLATES, Trim, template
 from host.sysid.models.uncertainty import Uncertainty
 from host.sysid.numerics.model_problems import output_problem
 from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.reconstruction.flight_path import AIR, PITOT
 from host.sysid.reconstruction.reconstruction import Compatibility
 from host.sysid.reconstruction.sensor_corrections import (
     INSTANTANEOUS_ERRORS,
@@ -38,9 +39,19 @@ from host.sysid.reconstruction.sensor_corrections import (
     pressure_share,
     residual_deviations,
 )
-from host.sysid.reconstruction.sensor_dynamics import perturb_columns, residual_errors
+from host.sysid.reconstruction.sensor_dynamics import (
+    ANGLES,
+    advance_in_time,
+    perturb_columns,
+    residual_errors,
+)
 
 RECONSTRUCTED = "reconstruction of this flight"  # that left less of an error than files state
+VANE_PLACE = "vane_x_m"
+# Of the dynamic pressure, most that a pitot's zero is moved by at once: one that nobody zeroed is
+# off by more than all of it, and no airspeed would be left. A larger one counts in proportion.
+MOST_PRESSURE = 0.2
+PITOT_ZERO = PITOT[1]
 TRIMMING = ("airspeed_mps", "alpha_rad", "theta_rad", "qbar_pa", "density_kgpm3")
 
 
@@ -50,6 +61,8 @@ def systematic_error_shifts(
     cuts: Sequence[Mapping[str, Array]],
     known: Sequence[Compatibility],
     trim: Trim,
+    *,
+    late_vanes: bool = False,
 ) -> tuple[ShiftedEstimate, ...]:
     """Return the shift of the estimate for one standard deviation of each uncorrected sensor error.
 
@@ -65,22 +78,25 @@ def systematic_error_shifts(
         Of the flight of each maneuver. An error is one of all flights, in each of them by its own
         deviation there: what is new at every power-on counts as if it were not.
     trim : Trim
+    late_vanes : bool
+        Whether a delay of the vanes was estimated: it has taken up what of their place looks alike.
 
     Returns
     -------
-    tuple of Moved
+    tuple of ShiftedEstimate
         Empty if the model diverges at the answer.
     """
     one_step = one_step_of(result, maneuvers, trim)
     if one_step is None:
         return ()
     shifted = []
-    for one in _without_each(result.model, maneuvers, cuts, known, trim):
+    for one in _without_each(result.model, maneuvers, cuts, known, trim, late_vanes=late_vanes):
         estimate = result.estimate
         if not one.same(result.model, maneuvers):
             change = one_step.change(one.model, one.trim, one.maneuvers)
-            estimate = estimate + change.sum(axis=0)
-        shifted.append(ShiftedEstimate(one.error, estimate, *one.gains))
+            estimate = estimate + change.sum(axis=0) / one.part
+        gains = (1.0 + (gain - 1.0) / one.part for gain in one.gains)
+        shifted.append(ShiftedEstimate(one.error, estimate, *gains))
     return tuple(shifted)
 
 
@@ -126,7 +142,8 @@ def systematic_residuals(
         other = output_problem(one.model, one.maneuvers)
         there = outputs if one.simulates_the_same(model, smooth) else other.outputs(theta)
         for k, changes in enumerate(found):
-            changes.append(0.0 * outputs[k] if there is None else other.residual(k, there[k]))
+            moved = 0.0 * outputs[k] if there is None else other.residual(k, there[k])
+            changes.append(moved / one.part)
     moving = [k for k, changes in enumerate(zip(*found, strict=True)) if np.any(np.hstack(changes))]
     return [
         np.stack([changes[k] for k in moving], axis=-1) if moving else np.zeros((*y.shape, 0))
@@ -136,9 +153,10 @@ def systematic_residuals(
 
 @dataclass(frozen=True, slots=True)
 class _WithoutOne:
-    """Model, trim and maneuvers without one standard deviation of an error."""
+    """Model, trim and maneuvers without one standard deviation of an error, or a part of it."""
 
     error: str
+    part: float
     gains: tuple[float, float]  # of airspeed and dynamic pressure
     model: LinearModel
     trim: Trim
@@ -162,6 +180,8 @@ def _without_each(
     cuts: Sequence[Mapping[str, Array]],
     known: Sequence[Compatibility],
     trim: Trim,
+    *,
+    late_vanes: bool = False,
 ) -> Iterator[_WithoutOne]:
     """Yield the data, and through the trim the model, without each uncorrected error."""
     still = _mean_of(cuts)
@@ -172,8 +192,12 @@ def _without_each(
     }
     fresh = is_template(model, trim)
     for error in dict.fromkeys(e for c in known for e in sizes[id(c)]):
+        part = 1.0
+        if error == PITOT_ZERO:
+            most = MOST_PRESSURE * max(still[1].qbar_pa, 1.0)
+            part = min(1.0, most / max(s.get(error, 0.0) for s in sizes.values()))
         other = [
-            _without_one(cut, error, sizes[id(c)].get(error, 0.0), c)
+            _without_one(cut, error, part * sizes[id(c)].get(error, 0.0), c, late_vanes=late_vanes)
             for cut, c in zip(cuts, known, strict=True)
         ]
         changed = [_changed(model, m, c, o) for m, c, o in zip(maneuvers, cuts, other, strict=True)]
@@ -184,7 +208,7 @@ def _without_each(
         )
         bent = _bent(trim, still[0], there[0]) if fresh and there[0] != still[0] else trim
         moved = model if bent is trim else retrimmed(model, bent)
-        yield _WithoutOne(error, gains, moved, bent, changed)
+        yield _WithoutOne(error, part, gains, moved, bent, changed)
 
 
 def errors_left_open(known: Compatibility, columns: Mapping[str, Array]) -> tuple[ErrorSource, ...]:
@@ -205,12 +229,25 @@ def errors_left_open(known: Compatibility, columns: Mapping[str, Array]) -> tupl
 
 
 def _without_one(
-    columns: Mapping[str, Array], error: str, deviation: float, known: Compatibility
+    columns: Mapping[str, Array],
+    error: str,
+    deviation: float,
+    known: Compatibility,
+    *,
+    late_vanes: bool,
 ) -> dict[str, Array]:
-    """Return columns with one standard deviation of an error removed."""
+    """Return columns with one standard deviation of an error removed.
+
+    A vane ahead of the CG by x lags by x/V, but for what the angle does beside turning with the
+    aircraft. A delay that was estimated has taken that up.
+    """
     if error in INSTANTANEOUS_ERRORS:
         return correct_columns(columns, {error: deviation}, pressure_share(known))
-    return perturb_columns(columns, error, deviation, known)
+    found = perturb_columns(columns, error, deviation, known)
+    if error == VANE_PLACE and late_vanes and AIR[0] in columns:
+        lag_s = deviation / float(np.median(columns[AIR[0]]))
+        return advance_in_time(found, ANGLES, -lag_s)
+    return found
 
 
 def add_systematic_covariance(result: FitResult, moved: Sequence[ShiftedEstimate]) -> Uncertainty:
@@ -245,9 +282,11 @@ def _changed(
     """Return a maneuver with the difference of two sets of columns added; itself without any."""
 
     def moved(names: Sequence[str], values: Array) -> Array:
-        if all(other[n] is still[n] or np.array_equal(other[n], still[n]) for n in names):
+        own = [n if n in still else "" for n in names]  # a user's column, which no error moves
+        if all(other[n] is still[n] or np.array_equal(other[n], still[n]) for n in own if n):
             return values
-        return values + np.column_stack([other[n] - still[n] for n in names])
+        none = np.zeros(len(values))
+        return values + np.column_stack([other[n] - still[n] if n else none for n in own])
 
     same = other.get("t_s") is still.get("t_s")
     longer = 1.0 if same else float(np.ptp(other["t_s"]) / np.ptp(still["t_s"]))

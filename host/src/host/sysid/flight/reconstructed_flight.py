@@ -72,6 +72,8 @@ class ReconstructedFlight:
         Of its sensors, where a calibration says better than what is usual of the maker's.
     calibration_alone : Compatibility or None
         Of sensors that came to no agreement: all that their calibration leaves open.
+    by_default : Compatibility or None
+        Of an aircraft without a file: all that is open of sensors of which nothing is known.
     record : tuple of ColumnChange
         What was done to `corrected`, and why.
     tuned : tuple of TunedModel
@@ -93,6 +95,7 @@ class ReconstructedFlight:
     maker: str = OWN
     errors: InstrumentErrors | None = None
     calibration_alone: Compatibility | None = None
+    by_default: Compatibility | None = None
     record: Record = ()
     tuned: tuple[TunedModel, ...] = ()
 
@@ -114,6 +117,7 @@ def reconstruct_flight(
     source: str = "",
     airframe: AirframeData | None = None,
     compatibility: Compatibility | None = None,
+    by_default: Compatibility | None = None,
     instrument: SensorErrorModel | None = None,
     findings: Sequence[Finding] = (),
     resolution: Mapping[str, float] | None = None,
@@ -132,6 +136,8 @@ def reconstruct_flight(
         Gives places of the sensors.
     compatibility : Compatibility, optional
         Data-compatibility check; the sensor errors that it estimates are removed.
+    by_default : Compatibility, optional
+        The same in place of none.
     instrument : SensorErrorModel, optional
         As it was on this flight.
     findings : sequence of Finding
@@ -141,7 +147,8 @@ def reconstruct_flight(
     maker : str
         Who recorded it.
     """
-    sensor_errors = {c.name: c.value for c in corrections(compatibility)} if compatibility else {}
+    standing = compatibility or by_default
+    sensor_errors = {c.name: c.value for c in corrections(standing)} if standing else {}
     delays_open = True
     if airframe is not None and compatibility is not None and compatibility.instrument is not None:
         at_cg = columns_at_cg(columns, airframe, compatibility)
@@ -151,8 +158,8 @@ def reconstruct_flight(
         if airframe is not None:
             at_cg = transfer_to_cg(at_cg, airframe)
     corrected = at_cg
-    if compatibility is not None:
-        corrected = correct_columns(at_cg, sensor_errors, pressure_share(compatibility))
+    if standing is not None:
+        corrected = correct_columns(at_cg, sensor_errors, pressure_share(standing))
     record = (
         *change_of(columns, at_cg, "as sensors without delay at the CG", "the aircraft file"),
         *change_of(at_cg, corrected, "sensor errors removed", "the reconstruction estimates them"),
@@ -168,6 +175,7 @@ def reconstruct_flight(
         tuple(findings),
         resolution or {},
         maker=maker,
+        by_default=by_default,
         record=record,
     )
 

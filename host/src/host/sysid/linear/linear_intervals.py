@@ -36,16 +36,20 @@ from host.sysid.linear.linear_stages import LinearEstimate, LinearIntervals
 from host.sysid.maneuvers.pilot_takeover import taken_over
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.models.uncertainty import Uncertainty
 from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
 from host.sysid.numerics.maneuver_agreement import disagreement, maneuver_agreement
 from host.sysid.numerics.score_variance import white_fit_variance
+from host.sysid.reconstruction.flight_path import PITOT
 from host.sysid.reconstruction.reconstruction import Compatibility
+from host.sysid.reconstruction.sensor_corrections import DENSITY
 from host.sysid.reconstruction.sensor_dynamics import DELAYED_COLUMNS, IMU_DELAY, SERVO_DELAY
 from host.sysid.validation.free_simulation import FreeResponses, free_responses
 from host.sysid.validation.noise_model_limits import excess_over_noise_model
 
 LEAST_COMMANDED = 0.25  # of all samples, in maneuvers that a test input made
+VANES_DELAY = STANDARD_DELAYS[0].name
 WHITE = "output error (white)"  # its noise is judged beside what the inputs drive
 
 
@@ -187,7 +191,8 @@ def _tested(e: LinearEstimate, free: FreeResponses, chosen: Sequence[int]) -> In
 
 def _carriers(e: LinearEstimate) -> list[Compatibility | None]:
     """Return what is known of the sensors of each maneuver."""
-    return [m.flight.compatibility or m.flight.calibration_alone for m in e.columns.used]
+    flights = [m.flight for m in e.columns.used]
+    return [f.compatibility or f.calibration_alone or f.by_default for f in flights]
 
 
 def _shifts(e: LinearEstimate, statistical: FitResult) -> tuple[ShiftedEstimate, ...]:
@@ -244,7 +249,12 @@ def _by_sensors(
     # with it: all outputs later are all inputs earlier.
     estimated = {SERVO_DELAY, IMU_DELAY} if e.columns.servo is not None else set()
     estimated |= DELAYED_COLUMNS.keys() if e.found.delays else set()
-    moved = systematic_error_shifts(statistical, fitted, e.columns.cuts, known, e.trim)
+    # Without a file the airspeed's error is one, of which the data tell a part: `_by_airspeed`.
+    estimated |= {*PITOT, DENSITY} if e.columns.airframe is None and e.trim.known else set()
+    late = e.columns.airframe is None and VANES_DELAY in e.found.delays
+    moved = systematic_error_shifts(
+        statistical, fitted, e.columns.cuts, known, e.trim, late_vanes=late
+    )
     return tuple(s for s in moved if s.error not in estimated)
 
 

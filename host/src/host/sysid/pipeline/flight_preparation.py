@@ -88,6 +88,9 @@ def prepare(given: FlightAtHand) -> PreparedFlight:
     # A law is seen in commands: a servo moves the surface later and slower.
     fed_back = feedback_findings({**columns, **commands}, found)
     agreed = _agreement(given, columns, instrument, sensors)
+    told = agreed.found if how.corrections else None
+    unplaced = sensors.recorded(read.recording)
+    by_default = None if known else by_calibration_alone(unplaced, told)
     flight = reconstruct_flight(
         columns,
         found,
@@ -95,6 +98,7 @@ def prepare(given: FlightAtHand) -> PreparedFlight:
         airframe=known.airframe if known else None,
         # Without sensor positions a vane ahead of the CG looks like a delayed one.
         compatibility=agreed.found if known is not None and how.corrections else None,
+        by_default=by_default,
         instrument=instrument,
         resolution=read.resolution,
         maker=read.recording.maker,
@@ -122,6 +126,7 @@ def prepare(given: FlightAtHand) -> PreparedFlight:
         errors=sensors.errors,
         calibration_alone=agreed.by_calibration,
         tuned=read.tuned,
+        by_default=by_calibration_alone(sensors.recorded(read.recording)),
         record=(
             *change_of(read.columns, in_rad, "shares of travel made angles", "the aircraft file"),
             *change_of(in_rad, columns, "commands brought behind usual servos", "no pot is there"),
@@ -137,8 +142,8 @@ def prepare(given: FlightAtHand) -> PreparedFlight:
 def _sensors(given: FlightAtHand, instrument: SensorErrorModel | None) -> SensorErrorModel:
     """Return the instrument of a flight, or what is usual of its maker's; what is known better."""
     calibration = given.how.calibration
-    better = load_calibration(calibration) if calibration is not None else None
-    sensors = instrument or unknown_sensors(given.read.recording, better)
+    known = load_calibration(calibration) if calibration is not None else given.read.calibration
+    sensors = instrument or unknown_sensors(given.read.recording, known)
     return sensors if given.errors is None else replace(sensors, errors=given.errors)
 
 

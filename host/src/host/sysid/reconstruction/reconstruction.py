@@ -40,7 +40,7 @@ VANE_MODEL_SD = 0.006  # of scale: dry friction known to 20 % of its 3 %
 # Without GPS only vanes and pitot, gusts included, determine the path: on eight flights rms errors
 # were up to 2.5 times the computed deviations, more for biases of the gyro.
 NO_GPS_INFLATION = 2.5
-UNOBSERVABLE_WITHOUT_GPS = INERTIAL[0:3]
+GYRO_ZEROS = UNOBSERVABLE_WITHOUT_GPS = INERTIAL[0:3]
 REASONS = {
     "pitot_scale": "wind and scale look alike on one heading, gusts hide it: fly full turns",
     "pitot_zero_pa": "fly slow and fast parts, or zero the pitot at rest",
@@ -178,56 +178,24 @@ def reconstruct(
     return Compatibility(tuple(findings), rms, when, gps, instrument, tests, vanes)
 
 
-def _estimate(
-    name: str,
-    found: Mapping[str, tuple[float, float]],
-    priors: Mapping[str, tuple[float, float]],
-    vane_delay: tuple[float, float] | None,
-    *,
-    gps: bool,
-) -> SensorErrorEstimate:
-    """Return what is known of a sensor's error by the flight, else beforehand.
+def by_calibration_alone(
+    instrument: SensorErrorModel, told: Compatibility | None = None
+) -> Compatibility:
+    """Return a check in which each error is as open as its calibration leaves it.
+
+    It stands where sensors came to no agreement, or where no aircraft file places them.
 
     Parameters
     ----------
-    name : str
-    found, priors : mapping
-        Value and deviation by the flight, and beforehand.
-    vane_delay : tuple of float, optional
-        The vanes' by the aircraft file.
-    gps : bool
+    instrument : SensorErrorModel
+    told : Compatibility, optional
+        Of sensors at unknown places: the zeros of its gyros need none, and stand.
     """
-    sd = priors[name][1]
-    value, deviation = found.get(name, priors[name])
-    if not gps:
-        deviation = min(NO_GPS_INFLATION * deviation, sd)
-        if name == FLOW[1] and deviation < sd:
-            value, deviation = _beside_imu((value, deviation), sd, priors)
-    data_informed = deviation < POSTERIOR_PRIOR_RATIO * sd
-    reason = "" if data_informed else _reason(name, gps=gps)
-    if (
-        name == DELAYS[0]
-        and vane_delay is not None
-        and _known_better((value, deviation), vane_delay)
-    ):
-        sd, data_informed, reason = vane_delay[1], False, BY_FILE
-    return SensorErrorEstimate(
-        name=name,
-        value=value,
-        half_width=NORMAL_95 * deviation,
-        prior_half_width=NORMAL_95 * sd,
-        data_informed=data_informed,
-        reason=reason,
-    )
-
-
-def by_calibration_alone(instrument: SensorErrorModel) -> Compatibility:
-    """Return a check that tells nothing: each error is as open as its calibration leaves it.
-
-    It stands where sensors came to no agreement. Pots and vanes were in no interval there.
-    """
+    known = {f.name: f for f in told.findings if f.data_informed} if told is not None else {}
     findings = (
-        SensorErrorEstimate(
+        known[name]
+        if name in known and name in GYRO_ZEROS
+        else SensorErrorEstimate(
             name, mean, NORMAL_95 * sd, NORMAL_95 * sd, data_informed=False, reason=NO_AGREEMENT
         )
         for name, (mean, sd) in prior(instrument).items()

@@ -106,9 +106,10 @@ def residual_errors(found: Compatibility, columns: Mapping[str, Array]) -> dict[
         return {}
     every = prior_deviations(i, NO_OFFSETS)
     wanted = (*PLACES, *POTS, *SERVOS, SERVO_DELAY, CLOCK, FRICTION, IMU_DELAY, PITOT_DELAY)
-    return {n: every[n] for n in wanted if n in every} | {
-        VANE_DELAY: vane_delay_of(found, i, columns)[1]
-    }
+    sizes = {n: every[n] for n in wanted if n in every}
+    if AIR[0] in columns:  # a vane's delay goes by the airspeed
+        sizes[VANE_DELAY] = vane_delay_of(found, i, columns)[1]
+    return sizes
 
 
 def perturb_columns(
@@ -131,7 +132,7 @@ def perturb_columns(
         return advance_in_time(
             result, tuple(f"{name}_rad" for name in i.recording.commanded), -size
         )
-    if error == FRICTION and i is not None:
+    if error == FRICTION and i is not None and AIR[0] in columns:
         dt_s = float(columns["t_s"][1] - columns["t_s"][0])
         more_friction = replace(i, vane_friction_rad=size * i.vane_friction_rad)
         return result | {

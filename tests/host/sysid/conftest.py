@@ -1,0 +1,24 @@
+"""Records of these tests have noise alone: their sensors are told to be without errors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from host.instrument.instrument_errors import InstrumentErrors, usual_errors
+
+OF_AIRSPEED = {"pitot_scale", "pitot_zero_pa", "density_share"}  # which their data tell
+
+
+def known_sensors(maker: str, *_: object) -> InstrumentErrors:
+    """Return usual errors of the airspeed, and next to none of all else."""
+    errors = usual_errors(maker)
+    return errors.scaled(0.01, *(e.name for e in errors if e.name not in OF_AIRSPEED))
+
+
+@pytest.fixture(scope="package", autouse=True)
+def sensors_without_errors() -> Iterator[None]:
+    """Stand in for the errors of an aircraft without a file: tests/host/instrument has those."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("host.instrument.deviations.errors_without_file", known_sensors)
+        yield
