@@ -10,3 +10,6 @@ DEG_PER_RAD = 180.0 / math.pi
 RAD_PER_DEG = math.pi / 180.0
 # Standard deviations to either side of a normal distribution's mean that hold 95 % of it.
 NORMAL_95 = 1.96
+# 95 % half-width over an estimate, or over what would contribute 5 % of its row: up to the first it
+# is trusted, up to the second used with care. Everything that judges a width reads these two.
+TRUST_SHARE, CARE_SHARE = 0.10, 0.30

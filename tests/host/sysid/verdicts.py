@@ -11,11 +11,10 @@ NO_EVIDENCE = Evidence()
 
 
 def verdict_of(answer: Answer | CoefficientAnswer, evidence: Evidence = NO_EVIDENCE) -> Verdict:
-    """Return the verdict on one answer, other linear answers and findings beside it."""
+    """Return the verdict on one answer, findings beside it."""
     if isinstance(answer, CoefficientAnswer):
-        return judge(evidence.beside, answer, evidence.findings)[-1]
-    others = [one for one in evidence.beside if one is not answer]
-    return judge([answer, *others], None, evidence.findings)[0]
+        return judge((), answer, evidence.findings)[-1]
+    return judge([answer], None, evidence.findings)[0]
 
 
 def verdict_lines(

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from host.aircraft.input_steps import ROLL_HALF_S, half_of_doublet_s, unit_of_3211_s
 from host.aircraft.mode_names import DUTCH_ROLL, SHORT_PERIOD
+from host.constants import CARE_SHARE, TRUST_SHARE
 from host.sysid.answer.known_axes import MOVERS
-from host.sysid.answer.marks import FAIR, TRUST
 from host.sysid.answer.parameter_words import GOOD, NOT, TINY, coefficient_of
 from host.sysid.answer.summary_rows import SummaryRow
 
@@ -117,10 +117,11 @@ def _input(
 ) -> AdvisedInput:
     surface, kind = INPUTS[motion]
     flown = sizes.get(surface, ())
-    before = max(flown, default=USUAL_DEG[surface])
-    size = min(LARGER * before, LARGEST_DEG) if flown else before
-    too_wide = max((row.share / (FAIR if row.word == NOT else TRUST) for row in rows), default=1.0)
-    more = max(len(flown), 1) * (too_wide**2 - 1.0) * (before / size) ** 2
+    size = LARGER * max(flown) if flown else USUAL_DEG[surface]
+    too_wide = max(
+        (row.share / (CARE_SHARE if row.word == NOT else TRUST_SHARE) for row in rows), default=1.0
+    )
+    more = max(len(flown), 1) * (too_wide**2 - 1.0) / LARGER**2
     count = int(min(max(math.ceil(more), 1), MOST))
     return AdvisedInput(
         surface, kind, float(max(round(size), 1)), _duration_s(motion, kind, period_s), count,

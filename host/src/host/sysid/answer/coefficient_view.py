@@ -7,18 +7,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from host.sysid.answer.doubt import Doubt, doubt
-from host.sysid.answer.marks import Judged, percent, share_text
+import numpy as np
+
+from host.sysid.answer.marks import Judged, share_text
 from host.sysid.answer.trust_rules import (
     Rule,
-    fit_fails,
     impossible_sign,
     input_feedback,
-    not_predicted,
     open_finding,
-    own,
 )
-from host.sysid.coefficients.coefficient_fit import FLAG_SHARE
 from host.sysid.models.coefficient_model import standard_model
 
 if TYPE_CHECKING:
@@ -27,7 +24,7 @@ if TYPE_CHECKING:
 
 WORSE = 1.25  # NRMSE of unseen over fitted maneuvers: more is a model that does not carry over
 EXCITED = "the inputs excite it too little"
-FAILS = 1.0  # NRMSE below 4.5 Hz, gusts in it: the mean would do better
+ENTANGLED = 0.9  # correlation: what is wrong of one is wrong of both
 FORCES = ("CL", "CD", "CX", "CZ")
 # Channel to the equations whose response it makes, and to the labels it multiplies; "" is all.
 LEANING: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
@@ -70,11 +67,6 @@ class CoefficientView:
             f" {len(answer.windows) - along} of aileron and rudder fitted together"
         )
 
-    @property
-    def fair(self) -> float:
-        """Largest share of a half-width in its estimate that is used with care."""
-        return FLAG_SHARE
-
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Coefficients in the order of the fit."""
@@ -84,7 +76,7 @@ class CoefficientView:
     def estimates(self) -> tuple[Judged, ...]:
         """Each coefficient by its width alone: one beyond its size is of no use."""
         found = self.answer.fit.derivatives
-        return tuple(Judged(d.name, d.share, unusable=d.share > 1.0) for d in found)
+        return tuple(Judged(d.name, d.share) for d in found)
 
     @property
     def values(self) -> dict[str, float]:
@@ -112,24 +104,13 @@ class CoefficientView:
         equations = both[0] & both[1]
         return ["_".join(n) for n in names if n[0] in equations and n[-1] in (*own, *others)]
 
-    def failures(self) -> list[tuple[list[str], str]]:
-        """Return the coefficients of equations that the fit does not explain, and the reason."""
-        found = self.answer.fit.prediction
-        return [
-            (
-                _of_equation(self.names, equation),
-                f"the fit fails in {equation} (NRMSE {percent(nrmse)})",
-            )
-            for equation, nrmse in (found.fitted if found else {}).items()
-            if not nrmse < FAILS
-        ]
-
-    def unpredicted(self) -> list[tuple[list[str], str]]:
-        """Return the coefficients of equations that do not carry over, and the reason."""
-        return [
-            (_of_equation(self.names, equation), f"{equation} is not predicted ({words})")
-            for equation, words in _not_carried_over(self.answer).items()
-        ]
+    def entangled(self, name: str) -> set[str]:
+        """Return the coefficients of an equation, and those that correlate with one of it."""
+        fit, k = self.answer.fit, self.names.index(name)
+        sd = np.sqrt(np.maximum(np.diag(fit.covariance), 1e-300))
+        correlated = np.abs(fit.covariance[k] / sd[k] / sd) > ENTANGLED
+        beside = {other for other, one in zip(self.names, correlated, strict=False) if one}
+        return beside | set(_of_equation(self.names, name.partition("_")[0]))
 
     def first_lines(self) -> list[str]:
         """Return nothing: the search has no other end."""
@@ -142,22 +123,16 @@ class CoefficientView:
 
     def further_lines(self, findings: Sequence[Finding]) -> list[str]:
         """Return the lines on maneuvers that do not agree, and on prediction."""
-        return [*_agreement_lines(self.answer), _prediction_line(self.answer)]
-
-
-def lag_beside(answer: CoefficientAnswer) -> list[Doubt]:
-    """Doubt a moment that a lag of surfaces moves beyond its intervals."""
-    names = [d.name for d in answer.fit.derivatives]
-    return [
-        one
-        for equation, far in answer.lagging.items()
-        for one in doubt(
-            _of_equation(names, equation),
-            names,
-            f"surfaces seem to lag behind their columns, which moves {equation} by {far:.1f}"
-            " half-widths",
-        )
-    ]
+        late = self.answer.lagging
+        return [
+            *(
+                [f"  surfaces seem to lag behind their columns: {', '.join(late)} widened to it"]
+                if late
+                else []
+            ),
+            *_agreement_lines(self.answer),
+            _prediction_line(self.answer),
+        ]
 
 
 def _of_equation(names: Sequence[str], equation: str) -> list[str]:
@@ -184,7 +159,7 @@ def _flag_lines(answer: CoefficientAnswer) -> list[str]:
             continue
         cause, part = answer.causes.get(d.name, ("", 0.0))
         why = f"{100.0 * part:.0f} % of its variance comes from {cause}" if cause else EXCITED
-        lines.append(f"  not known: {d.name} (+- {share_text(d.share, FLAG_SHARE)}; {why})")
+        lines.append(f"  not known: {d.name} (+- {share_text(d.share)}; {why})")
     return lines
 
 
@@ -216,8 +191,5 @@ def _prediction_line(answer: CoefficientAnswer) -> str:
 RULES: tuple[Rule, ...] = (
     open_finding,
     input_feedback,
-    fit_fails,
-    not_predicted,
     impossible_sign,
-    own(lambda answer, _: lag_beside(answer)),
 )

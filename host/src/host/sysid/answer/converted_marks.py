@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from host.aircraft.gains import dimensional_name
 from host.sysid.answer.marks import MARKS, SMALL, Judged, mark_of
+from host.sysid.models.diagnostics import reference_values
 
 if TYPE_CHECKING:
     from host.sysid.aerodynamics.coefficient import Coefficient
@@ -28,11 +29,14 @@ def converted_marks(answer: Answer, marks: Mapping[str, str]) -> dict[str, str]:
     for c in answer.coefficients:
         behind = marks.get(dimensional_name(c.name), "")
         if behind:
-            found[c.name] = (
-                behind if behind == SMALL else max(behind, _by_width(c), key=MARKS.index)
-            )
+            own = mark_of(Judged(c.name, _share(answer, c)))
+            found[c.name] = behind if behind == SMALL else max(behind, own, key=MARKS.index)
     return found
 
 
-def _by_width(c: Coefficient) -> str:
-    return mark_of(Judged(c.name, c.half_width / max(abs(c.value), 1e-300)))
+def _share(answer: Answer, c: Coefficient) -> float:
+    """Return the half-width over the value, or over what would contribute 5 % of the row."""
+    result, name = answer.result, dimensional_name(c.name)
+    size = reference_values(answer.model, answer.maneuvers, result.estimate)[result.index(name)]
+    larger = max(float(size) / max(abs(result.value(name)), 1e-300), 1.0)
+    return c.half_width / max(larger * abs(c.value), 1e-300)

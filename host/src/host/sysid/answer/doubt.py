@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from host.sysid.checks.data_finding import Finding
-    from host.sysid.linear.linear_answer import Answer
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,13 +24,10 @@ class Evidence:
 
     Attributes
     ----------
-    beside : tuple of Answer
-        All linear answers of the same data, this one among them.
     findings : tuple of Finding
         Of the data checks.
     """
 
-    beside: tuple[Answer, ...] = ()
     findings: tuple[Finding, ...] = ()
 
 

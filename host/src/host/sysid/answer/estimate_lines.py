@@ -108,7 +108,7 @@ def coefficient_lines(answer: CoefficientAnswer, verdict: Verdict) -> list[str]:
     ]
     for d in answer.fit.derivatives:
         cause = answer.causes.get(d.name, ("", 0.0))[0]
-        known = f"{share_text(d.share, verdict.fair)} {word_of(verdict.marks[d.name])}"
+        known = f"{share_text(d.share)} {word_of(verdict.marks[d.name])}"
         named = f"{d.name} {in_words(d.name)}"
         lines.append(_line(named, d.value, d.half_width, "", known, cause))
     lines.append("  CD_0 is the drag at zero lift, surfaces as flown")

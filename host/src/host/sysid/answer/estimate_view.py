@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
@@ -29,10 +29,6 @@ class EstimateView(Protocol):
         """The model, its maneuvers and method."""
 
     @property
-    def fair(self) -> float:
-        """Largest share of a half-width in its estimate that is used with care."""
-
-    @property
     def names(self) -> Sequence[str]:
         """Derivatives or coefficients in the model's order."""
 
@@ -54,11 +50,8 @@ class EstimateView(Protocol):
     def alike(self, law: Feedback) -> Collection[str]:
         """Return the estimates that a feedback law makes alike."""
 
-    def failures(self) -> Iterable[tuple[Collection[str], str]]:
-        """Return what the fit does not explain: estimates and the reason."""
-
-    def unpredicted(self) -> Iterable[tuple[Collection[str], str]]:
-        """Return what unseen maneuvers contradict: estimates and the reason."""
+    def entangled(self, name: str) -> Collection[str]:
+        """Return what a wrong estimate takes along: its row, and what correlates with it."""
 
     def first_lines(self) -> Sequence[str]:
         """Return the lines right behind the heading."""

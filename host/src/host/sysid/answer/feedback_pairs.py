@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.constants import NORMAL_95
-from host.sysid.answer.marks import FAIR
+from host.constants import CARE_SHARE, NORMAL_95
 
 if TYPE_CHECKING:
     from host.sysid.checks.data_finding import Feedback, Finding
@@ -63,7 +62,7 @@ def _known_sum(answer: Answer, name: str, gain: float, own: str) -> str:
     value = float(weight @ result.estimate[at])
     variance = float(weight @ result.covariance[np.ix_(at, at)] @ weight)
     half = NORMAL_95 * float(np.sqrt(max(variance, 0.0)))
-    if not half < FAIR * abs(value):
+    if not half < CARE_SHARE * abs(value):
         return ""
     sign = "-" if gain < 0.0 else "+"
     return f"{name} {sign} {abs(gain):.2g} {own} = {value:.4g} +- {half:.2g}"

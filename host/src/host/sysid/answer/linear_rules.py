@@ -7,12 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.sysid.answer.command_lag import lag_lookalikes, unknown_lag
 from host.sysid.answer.correlated_inputs import derivatives_of_both
 from host.sysid.answer.doubt import Doubt, Evidence, doubt
-from host.sysid.answer.marks import percent
-from host.sysid.answer.method_agreement import disagreements
-from host.sysid.answer.parameter_places import leaning_on
 from host.sysid.errors.systematic_errors import is_template, scaled_by_airspeed
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.validation.prediction_limits import FAILS, Prediction
@@ -33,32 +29,6 @@ WHITE_P = 0.01  # of Ljung-Box: above it the residual is a sensor's noise
 NEAR_BOUND = 1e-6  # of a bound's distance to the start, or of its size
 
 
-def driven_by_inputs(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """Doubt outputs of which inputs drive more than widening can answer for."""
-    if answer.coherence is None:
-        return []
-    left, shares = {f.name: f.nrmse for f in answer.fits}, answer.coherence.driven_shares()
-    names = [
-        name
-        for name in answer.coherence.dominated(LARGE_RATIO)
-        if not left.get(name, np.inf) * shares[name] < MATERIAL
-    ]
-    likely = answer.coherence.likely_error
-    like = f", most like {likely}" if likely else ""
-    reason = f"the residual of {', '.join(names)} follows the inputs{like}"
-    return _about(answer, names, reason)
-
-
-def delay_at_bound(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """Doubt signals whose delay is at its bound: the model lacks something there."""
-    groups = [g for g in (*STANDARD_DELAYS, *answer.model.delays) if g.name in answer.at_bound]
-    return [
-        one
-        for output in dict.fromkeys(y for g in groups for y in g.outputs)
-        for one in _about(answer, [output], f"the delay of {output} is at its bound")
-    ]
-
-
 def on_a_bound(answer: Answer, evidence: Evidence) -> list[Doubt]:
     """Doubt a value at the bound of the search."""
     half = answer.result.half_width()
@@ -71,35 +41,9 @@ def on_a_bound(answer: Answer, evidence: Evidence) -> list[Doubt]:
     return _named(answer, names, "the estimate is on its bound")
 
 
-def methods_disagree(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """Doubt what another method, valid in this noise, contradicts beyond the joint interval."""
-    return [
-        one
-        for name, reason in disagreements(answer, evidence.beside).items()
-        for one in _named(answer, [name], f"methods disagree: {reason}")
-    ]
-
-
 def one_input_for_two(answer: Answer, evidence: Evidence) -> list[Doubt]:
     """Doubt inputs that moved as one, of which a regression left one out."""
     return _named(answer, derivatives_of_both(answer), "both inputs moved alike; one was left out")
-
-
-def motion_left_out(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """Doubt a reduced template where short records hide what other states do."""
-    if not answer.left_out:
-        return []
-    reason = (
-        f"{answer.template} leaves out {' and '.join(answer.left_out)}, and no interval counts it"
-    )
-    return _about(answer, answer.model.states, reason)
-
-
-def lag_unknown(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """Doubt what commands do where nothing determines their lag."""
-    why = unknown_lag(answer)
-    reason = f"the lag behind the commands is not known ({why})"
-    return _named(answer, lag_lookalikes(answer), reason) if why else []
 
 
 def divided_by(answer: Answer, channel: str) -> set[str]:
@@ -114,11 +58,6 @@ def divided_by(answer: Answer, channel: str) -> set[str]:
         return {p.name for p in answer.model.parameters}
     known = answer.trim.known and is_template(answer.model, answer.trim)
     return scaled_by_airspeed(answer.model, answer.trim) if known else set()
-
-
-def failing_fits(answer: Answer) -> list[SignalFit]:
-    """Return the fitted outputs that are not explained, and not because a sensor is noisy."""
-    return [f for f in answer.fits if fails(f) and not _as_gusts_make(answer.explained, f)]
 
 
 def unpredicted(answer: Answer) -> list[SignalFit]:
@@ -162,21 +101,9 @@ def unpredicted_states(answer: Answer) -> dict[str, str]:
     return {s: found[s] for s in answer.model.states if s in found}
 
 
-def _about(answer: Answer, signals: Iterable[str], reason: str) -> list[Doubt]:
-    return _named(answer, leaning_on(answer.model, set(signals)), reason)
-
-
 def _named(answer: Answer, names: Iterable[str], reason: str) -> list[Doubt]:
     aircraft = (p.name for p in answer.model.parameters if not p.name.startswith("imu_"))
     return doubt(names, aircraft, reason)
-
-
-def missed_beyond(answer: Answer, fit: SignalFit) -> str:
-    """Return by how much an output is not predicted, and what was allowed."""
-    found = answer.predictions.get(fit.name)
-    if found is None or found.holds:
-        return f" (NRMSE {percent(fit.nrmse)})"
-    return f" (NRMSE {percent(found.nrmse)}, limit {percent(found.largest)})"
 
 
 def _reached(value: float, bound: float) -> bool:

@@ -2,60 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from host.constants import CARE_SHARE
 from host.sysid.answer.correlated_inputs import correlated_inputs
 from host.sysid.answer.feedback_pairs import alike_derivatives, combined_derivatives
 from host.sysid.answer.linear_rules import (
-    delay_at_bound,
     divided_by,
-    driven_by_inputs,
-    failing_fits,
-    lag_unknown,
-    methods_disagree,
-    missed_beyond,
-    motion_left_out,
     on_a_bound,
     one_input_for_two,
     unpredicted,
 )
-from host.sysid.answer.marks import FAIR, SMALL, UNSURE, Judged, mark_of, percent, share_text
+from host.sysid.answer.marks import SMALL, UNSURE, USELESS, Judged, mark_of, share_text
 from host.sysid.answer.parameter_places import leaning_on
 from host.sysid.answer.servo_lines import servo_lines
 from host.sysid.answer.trust_rules import (
     Rule,
-    fit_fails,
     impossible_sign,
     input_feedback,
-    not_predicted,
     open_finding,
     own,
 )
 from host.sysid.errors.surface_motion import HELD_SURFACES
 from host.sysid.linear.users_model import NOISE_CHOSEN
-from host.sysid.models.diagnostics import NOT_IDENTIFIABLE, reference_values
+from host.sysid.models.diagnostics import reference_values
 
 if TYPE_CHECKING:
     from host.sysid.checks.data_finding import Feedback, Finding
     from host.sysid.linear.linear_answer import Answer
 
+ENTANGLED = 0.9  # correlation: what is wrong of one is wrong of both
 PLACE = "imu_"  # begins the name of a sensor's place: no property of the aircraft
 RULES: tuple[Rule, ...] = (
     open_finding,
     input_feedback,
-    own(lag_unknown),
-    fit_fails,
-    not_predicted,
-    own(driven_by_inputs),
-    own(delay_at_bound),
     own(on_a_bound),
-    impossible_sign,
-    own(methods_disagree),
     own(one_input_for_two),
-    own(motion_left_out),
+    impossible_sign,
 )
 
 
@@ -78,11 +65,6 @@ class LinearView:
         by, held_out = answer.result.method, len(answer.held_out)
         return f"{answer.template}: {fitted}, {held_out} kept to be predicted; method: {by}"
 
-    @property
-    def fair(self) -> float:
-        """Largest share of a half-width in its estimate that is used with care."""
-        return FAIR
-
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Derivatives in the model's order."""
@@ -95,19 +77,16 @@ class LinearView:
         answer, result = self.answer, self.answer.result
         half = result.half_width()
         size = reference_values(answer.model, answer.maneuvers, result.estimate)
-        flags = {r.name: r for r in answer.identifiability_flags}
         lost = () if result.converged else ("no convergence",)
         found = []
         for name in self.names:
             k = result.index(name)
-            flag = flags.get(name)
             found.append(
                 Judged(
                     name,
-                    float(half[k]) / max(float(size[k]), 1e-300),
-                    (flag.reason, *lost) if flag else lost,
+                    math.inf if lost else float(half[k]) / max(float(size[k]), 1e-300),
+                    lost,
                     small=bool(size[k] > abs(float(result.estimate[k]))),
-                    unusable=bool(lost) or (flag is not None and flag.grade == NOT_IDENTIFIABLE),
                 )
             )
         return tuple(found)
@@ -121,7 +100,8 @@ class LinearView:
     @property
     def explained(self) -> set[str]:
         """Derivatives that the data hardly tell: each has a line of its own."""
-        return {r.name for r in self.answer.identifiability_flags}
+        wide = {one.name for one in self.estimates if not one.share <= CARE_SHARE}
+        return wide & {r.name for r in self.answer.identifiability_flags}
 
     def leaning_on(self, channel: str) -> set[str]:
         """Return the derivatives in a column's equation, and those that it multiplies or scales."""
@@ -131,25 +111,15 @@ class LinearView:
         """Return the derivatives that a feedback law makes alike."""
         return [name for group in alike_derivatives(self.answer.model, law) for name in group]
 
-    def failures(self) -> list[tuple[set[str], str]]:
-        """Return the derivatives of outputs that the fit does not explain, and the reason."""
-        return [
-            (
-                leaning_on(self.answer.model, {fit.name}),
-                f"the fit fails in {fit.name} (NRMSE {percent(fit.nrmse)})",
-            )
-            for fit in failing_fits(self.answer)
-        ]
-
-    def unpredicted(self) -> list[tuple[set[str], str]]:
-        """Return the derivatives of outputs that unseen maneuvers contradict, and the reason."""
-        return [
-            (
-                leaning_on(self.answer.model, {fit.name}),
-                f"{fit.name} is not predicted{missed_beyond(self.answer, fit)}",
-            )
-            for fit in unpredicted(self.answer)
-        ]
+    def entangled(self, name: str) -> set[str]:
+        """Return the derivatives of a row, and those that correlate with one of it."""
+        row, result = name.partition("_")[0], self.answer.result
+        correlated = result.correlation[result.index(name)]
+        return {
+            own
+            for own in self.names
+            if own.partition("_")[0] == row or abs(correlated[result.index(own)]) > ENTANGLED
+        }
 
     def first_lines(self) -> list[str]:
         """Return the warning of a search that did not end."""
@@ -162,7 +132,9 @@ class LinearView:
         wide = [
             f"{one.name} ({share_text(one.share)})"
             for one in judged
-            if mark_of(one) == UNSURE and not one.against
+            if mark_of(one) in {UNSURE, USELESS}
+            and not one.against
+            and one.name not in self.explained
         ]
         if wide:
             lines.append(f"  not known (interval above 30 %):  {', '.join(wide)}")
@@ -176,7 +148,7 @@ class LinearView:
         """Return the lines on identifiability, inputs, servos, feedback and prediction."""
         answer = self.answer
         return [
-            *_identifiability_lines(answer),
+            *_identifiability_lines(answer, self.explained),
             *_input_lines(answer),
             *servo_lines(answer),
             *combined_derivatives(answer, findings),
@@ -184,9 +156,9 @@ class LinearView:
         ]
 
 
-def _identifiability_lines(answer: Answer) -> list[str]:
+def _identifiability_lines(answer: Answer, explained: Collection[str]) -> list[str]:
     """Return the parameters that cannot be identified, and the reasons."""
-    flags = [r for r in answer.identifiability_flags if not r.name.startswith(PLACE)]
+    flags = [r for r in answer.identifiability_flags if r.name in explained]
     lines = []
     for flag in flags:
         lines.append(f"  not known: {flag.name} ({flag.reason})")

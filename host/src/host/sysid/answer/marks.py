@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-TRUST = 0.10  # 95 % half-width over value: good enough to design with
-FAIR = 0.30
+from host.constants import CARE_SHARE, TRUST_SHARE
+
 LARGEST_SHARE = 10.0  # that is printed
 # Best first.
 MARKS = TRUSTED, CAREFUL, SMALL, UNSURE, USELESS = (
@@ -28,30 +28,27 @@ class Judged:
         What speaks against it beside its width, a plain line each.
     small : bool
         Less than 5 % of its row, and known to be so.
-    unusable : bool
-        The data do not tell it at all.
     """
 
     name: str
     share: float
     against: tuple[str, ...] = ()
     small: bool = False
-    unusable: bool = False
 
 
-# Mark to what it needs, of an estimate and the largest share to be used with care; the first holds.
-MARK_RULES: tuple[tuple[str, Callable[[Judged, float], bool]], ...] = (
-    (USELESS, lambda one, fair: one.unusable),
-    (UNSURE, lambda one, fair: bool(one.against) or not one.share <= fair),
-    (SMALL, lambda one, fair: one.small),
-    (CAREFUL, lambda one, fair: one.share > TRUST),
-    (TRUSTED, lambda one, fair: True),
+# Mark to what it needs of an estimate; the first holds.
+MARK_RULES: tuple[tuple[str, Callable[[Judged], bool]], ...] = (
+    (USELESS, lambda one: not one.share <= 1.0),
+    (UNSURE, lambda one: bool(one.against) or one.share > CARE_SHARE),
+    (SMALL, lambda one: one.small),
+    (CAREFUL, lambda one: one.share > TRUST_SHARE),
+    (TRUSTED, lambda one: True),
 )
 
 
-def mark_of(one: Judged, fair: float = FAIR) -> str:
+def mark_of(one: Judged) -> str:
     """Return the mark of an estimate."""
-    return next(mark for mark, holds in MARK_RULES if holds(one, fair))
+    return next(mark for mark, holds in MARK_RULES if holds(one))
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,15 +65,12 @@ class Verdict:
         The same in words, with the reasons and what to fly again; the heading is the first.
     reasons : dict
         Parameter to why it stands under its mark, a plain line each.
-    fair : float
-        Largest share of a half-width in its estimate that is used with care.
     """
 
     heading: str
     marks: dict[str, str]
     lines: tuple[str, ...]
     reasons: dict[str, tuple[str, ...]]
-    fair: float = FAIR
 
 
 def names_marked(marks: Mapping[str, str], mark: str) -> list[str]:
@@ -84,12 +78,14 @@ def names_marked(marks: Mapping[str, str], mark: str) -> list[str]:
     return [name for name, own in marks.items() if own == mark]
 
 
-def share_text(share: float, fair: float = FAIR) -> str:
+def share_text(share: float) -> str:
     """Return a half-width's share in per cent, a decimal where it lies just beyond a limit."""
     if share >= LARGEST_SHARE:
         return f"> {100.0 * LARGEST_SHARE - 1.0:.0f} %"
     text = f"{100.0 * share:.0f}"
-    beyond = any(share > limit and text == f"{100.0 * limit:.0f}" for limit in (TRUST, fair))
+    beyond = any(
+        share > limit and text == f"{100.0 * limit:.0f}" for limit in (TRUST_SHARE, CARE_SHARE)
+    )
     return f"{100.0 * share:.1f} %" if beyond else f"{text} %"
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from host.constants import CARE_SHARE, TRUST_SHARE
 from host.sysid.answer.answer_summary import AnswerSummary, counted
 from host.sysid.answer.known_axes import MOVERS
-from host.sysid.answer.marks import FAIR, TRUST
 
 if TYPE_CHECKING:
     from host.sysid.answer.summary_rows import SummaryRow
@@ -103,10 +103,9 @@ def _two_columns(summary: AnswerSummary) -> list[str]:
     height = (len(cells) + 1) // 2
     right = [*cells[height:], ""]
     what = "derivatives (SI)" if all(r.unit for r in summary.rows) else "coefficients"
-    fair = max((v.fair for v in summary.verdicts), default=FAIR)
     head = (
         f"At {summary.condition}: {what}, 95 % share"
-        f" (good {100 * TRUST:.0f}, fair {100 * fair:.0f})"
+        f" (good {100 * TRUST_SHARE:.0f}, fair {100 * CARE_SHARE:.0f})"
     )
     return [
         head,

@@ -1,8 +1,8 @@
-"""What must hold before an estimate is trusted, whatever estimated it: the shared rules.
+"""What overrules an interval, whatever estimated it: a closed list.
 
 A rule returns doubts: estimates and a reason. A doubted one stands neither under "trust" nor under
-"use with care", whatever its interval. An interval counts noise and gusts, not what a model lacks:
-on a demonstration flight D_V was -0.33 +- 0.02 where -0.61 was true.
+"use with care", whatever its interval. Everything else that speaks against an estimate is in its
+interval: noise, gusts, what a model lacks, what is open of instrument and aircraft.
 """
 
 from __future__ import annotations
@@ -50,22 +50,18 @@ def input_feedback(view: EstimateView, evidence: Evidence) -> list[Doubt]:
     ]
 
 
-def fit_fails(view: EstimateView, evidence: Evidence) -> list[Doubt]:
-    """Doubt what the fitted data contradict, unless a sensor is noisy."""
-    return [one for names, why in view.failures() for one in doubt(names, view.names, why)]
-
-
-def not_predicted(view: EstimateView, evidence: Evidence) -> list[Doubt]:
-    """Doubt what an unseen maneuver contradicts beyond fit, noise and intervals."""
-    return [one for names, why in view.unpredicted() for one in doubt(names, view.names, why)]
-
-
 def impossible_sign(view: EstimateView, evidence: Evidence) -> list[Doubt]:
-    """Doubt a sign that no aircraft has; of a user's own model only the bounds speak."""
+    """Doubt a sign that no aircraft has, its row, and what correlates with it.
+
+    Of a user's own model only the bounds speak.
+    """
     return [
         one
         for name, reason in impossible_signs(view.values).items()
-        for one in doubt([name], view.names, reason)
+        for one in (
+            *doubt([name], view.names, reason),
+            *doubt(set(view.entangled(name)) - {name}, view.names, f"{name} beside it: {reason}"),
+        )
     ]
 
 

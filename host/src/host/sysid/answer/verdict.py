@@ -17,7 +17,6 @@ from host.sysid.answer.marks import (
     names_marked,
     share_text,
 )
-from host.sysid.answer.model_agreement import disagreements_of_models
 from host.sysid.answer.trust_rules import doubts_of, input_feedback, open_finding
 from host.sysid.reconstruction.sensor_corrections import correction_lines
 
@@ -34,7 +33,7 @@ def judge(
 ) -> tuple[Verdict, ...]:
     """Return a verdict for each answer to the same data, those of linear models first.
 
-    Each answer is doubted by its rules, by the findings, and by what the others say.
+    Each answer is doubted by its rules and by the findings.
 
     Parameters
     ----------
@@ -44,15 +43,9 @@ def judge(
     findings : sequence of Finding
         Of the data checks.
     """
-    evidence = Evidence(tuple(linear), tuple(findings))
+    evidence = Evidence(tuple(findings))
     views = views_of(linear, coefficients)
     doubts = [doubts_of(view, evidence) for view in views]
-    if coefficients is not None:
-        marks = [_marks(view, own) for view, own in zip(views, doubts, strict=True)]
-        for k, answer in enumerate(linear):
-            here, there = disagreements_of_models(answer, coefficients, marks[k], marks[-1])
-            doubts[k] += here
-            doubts[-1] += there
     return tuple(verdict(view, own, findings) for view, own in zip(views, doubts, strict=True))
 
 
@@ -74,16 +67,15 @@ def verdict(
     lines = [
         view.heading,
         *view.first_lines(),
-        *_mark_lines(view, marks),
+        *_mark_lines(marks),
         *view.width_lines(judged),
         *_doubt_lines(view, doubts),
         *view.further_lines(findings),
     ]
     reasons = {
-        one.name: (f"95 % half-width {share_text(one.share, view.fair)}", *one.against)
-        for one in judged
+        one.name: (f"95 % half-width {share_text(one.share)}", *one.against) for one in judged
     }
-    return Verdict(view.heading, marks, tuple(lines), reasons, view.fair)
+    return Verdict(view.heading, marks, tuple(lines), reasons)
 
 
 def doubted_by_findings(
@@ -116,15 +108,15 @@ def _doubted(view: EstimateView, doubts: Sequence[Doubt]) -> list[Judged]:
 
 
 def _marks(view: EstimateView, doubts: Sequence[Doubt]) -> dict[str, str]:
-    return {one.name: mark_of(one, view.fair) for one in _doubted(view, doubts)}
+    return {one.name: mark_of(one) for one in _doubted(view, doubts)}
 
 
-def _mark_lines(view: EstimateView, marks: dict[str, str]) -> list[str]:
-    """Return what is within a tenth, and what within `fair`, of its size."""
+def _mark_lines(marks: dict[str, str]) -> list[str]:
+    """Return what is within a tenth, and what within 30 %, of its size."""
     trusted = ", ".join(names_marked(marks, TRUSTED))
     lines = [f"  good (within 10 %):  {trusted or 'nothing'}"]
     if careful := names_marked(marks, CAREFUL):
-        lines.append(f"  fair (10 to {100.0 * view.fair:.0f} %):  {', '.join(careful)}")
+        lines.append(f"  fair (10 to 30 %):  {', '.join(careful)}")
     return lines
 
 

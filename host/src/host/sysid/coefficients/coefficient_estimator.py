@@ -36,7 +36,7 @@ from host.sysid.coefficients.coefficient_modes import (
 from host.sysid.coefficients.coefficient_search import search_coefficients
 from host.sysid.coefficients.deletion_diagnostics import CrossValidation
 from host.sysid.coefficients.flight_terms import flight_terms
-from host.sysid.coefficients.hidden_lag import lagging_equations
+from host.sysid.coefficients.hidden_lag import lag_shifts, widened_by
 from host.sysid.coefficients.pooled_flights import pool_fits
 from host.sysid.coefficients.window_spectra import SHORTEST_S, ResidualSpectra, Window
 from host.sysid.flight.reconstructed_flight import (
@@ -78,7 +78,8 @@ class CoefficientAnswer:
     remarks : tuple of str
         What was left out or assumed, because the flights lack what would tell it.
     lagging : dict
-        Moments that a lag of surfaces moves beyond their intervals, and how many half-widths.
+        Coefficients of moments that a lag of surfaces seems to move, and how far: their intervals
+        hold it.
     """
 
     model: CoefficientModel
@@ -195,6 +196,8 @@ class CoefficientEstimator:
             for one, width, prediction in zip(estimate, widths, predicted, strict=True)
         ]
         fit = pool_fits(fits)
+        lagging = lag_shifts([one.search for one in estimate], fit.derivatives)
+        fit = widened_by(fit, lagging)
         return CoefficientAnswer(
             model=self.model,
             fit=fit,
@@ -206,7 +209,7 @@ class CoefficientEstimator:
             systems=linear_systems(fit, self.airframe),
             delays=_delays(fit, self.instrument),
             remarks=tuple(dict.fromkeys(r for one in estimate for r in one.remarks)),
-            lagging=lagging_equations([one.search for one in estimate], fit.derivatives),
+            lagging=lagging,
         )
 
     def _of_one(self, flight: ReconstructedFlight) -> CoefficientEstimate:

@@ -8,13 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.constants import NORMAL_95
+from host.constants import CARE_SHARE, NORMAL_95
 from host.instrument.error_sources import ErrorSource
 from host.sysid.coefficients.deletion_diagnostics import CrossValidation
 from host.sysid.numerics.maneuver_agreement import ManeuverAgreement
 
 METHOD = "equation error with instrument errors"
-FLAG_SHARE = 0.12  # up to it an error beyond 15 % is a case of one in seventy
 SMALL_SHARE = 0.05  # of the largest contribution in its equation
 
 
@@ -44,7 +43,7 @@ class Derivative:
     @property
     def flagged(self) -> bool:
         """Whether it is too wide to be relied on."""
-        return self.share > FLAG_SHARE
+        return self.share > CARE_SHARE
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.templates import Trim
 
 AIRSPEED, COLUMN = "airspeed_share", "airspeed_mps"
-STEP = 0.02  # of the airspeed: beyond it the estimate is not linear in its scale
+STEP = 0.10  # of the airspeed: beyond it the estimate is not linear in its scale
 POSTERIOR_PRIOR_RATIO = 0.7  # below it the data tell the scale
 
 

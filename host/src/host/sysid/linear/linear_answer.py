@@ -61,7 +61,6 @@ class Answer:
     own_model: bool = False  # of the user, not a template
     coherence: InputCoherence | None = None  # of what free simulation leaves with the inputs
     predictions: dict[str, Prediction] = field(default_factory=dict)  # of outputs held out
-    explained: dict[str, Prediction] = field(default_factory=dict)  # of outputs fitted, in gusts
     noise_covariance: Array | None = None  # of the estimate, without systematic errors
     coefficient_parts: CoefficientParts | None = None
     errors: tuple[ErrorSource, ...] = ()  # that widen its intervals

@@ -127,7 +127,6 @@ class LinearEstimator:
             own_model=chosen.own,
             coherence=intervals.coherence,
             predictions=validation.predictions,
-            explained=validation.explained,
             held_out_runs=validation.held_out_runs,
             noise_covariance=statistical.covariance[np.ix_(kept, kept)],
             left_out=estimate.left_out,

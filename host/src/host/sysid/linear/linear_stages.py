@@ -158,8 +158,7 @@ class LinearValidation:
 
     Departures from the trim are as measured: airspeed and attitude in products with what moves.
     `predictions` sets the error of each output held out beside what noise and covariance allow;
-    `held_out_runs` are the maneuvers held out, with their outputs. `explained` is the same of the
-    maneuvers fitted, where process noise is estimated and an output is missed by half.
+    `held_out_runs` are the maneuvers held out, with their outputs.
     """
 
     simulated: tuple[Array, ...]
@@ -167,4 +166,3 @@ class LinearValidation:
     held_out: tuple[SignalFit, ...]
     predictions: dict[str, Prediction]
     held_out_runs: tuple[tuple[Maneuver, Array], ...] = ()
-    explained: dict[str, Prediction] = field(default_factory=dict)

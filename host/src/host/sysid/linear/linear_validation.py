@@ -6,13 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from host.arrays import Array
-from host.sysid.estimators.innovations import driven_states
 from host.sysid.linear.linear_stages import LinearEstimate, LinearIntervals, LinearValidation
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.residual_delays import advance_outputs, delays_of
 from host.sysid.models.state_space_model import DelayGroup, LinearModel
 from host.sysid.validation.free_simulation import fits_of, free_simulation, frozen_model
-from host.sysid.validation.prediction_limits import Prediction, missed, predictions
+from host.sysid.validation.prediction_limits import missed, predictions
 
 
 def linear_validation(
@@ -51,10 +50,6 @@ def linear_validation(
     runs = _simulated(frozen, held_out, at_trim)
     fits, held_out_fits = fits_of(model, maneuvers, simulated), fits_of(model, held_out, runs)
     airspeed_mps = e.trim.airspeed_mps
-    explained: dict[str, Prediction] = {}
-    # Drawing gusts took 8 % of the five-minute default: only where an output is missed by half.
-    if driven_states(result) and missed(fits):
-        explained = predictions(model, result, total, noise, maneuvers, simulated, airspeed_mps)
     asked_mps = airspeed_mps if missed(held_out_fits) else None
     return LinearValidation(
         tuple(simulated),
@@ -62,7 +57,6 @@ def linear_validation(
         held_out_fits,
         predictions(model, result, total, noise, held_out, runs, asked_mps),
         tuple(zip(held_out, runs, strict=True)),
-        explained,
     )
 
 

@@ -126,7 +126,6 @@ def prepare(given: FlightAtHand) -> PreparedFlight:
         errors=sensors.errors,
         calibration_alone=agreed.by_calibration,
         tuned=read.tuned,
-        by_default=by_calibration_alone(sensors.recorded(read.recording)),
         record=(
             *change_of(read.columns, in_rad, "shares of travel made angles", "the aircraft file"),
             *change_of(in_rad, columns, "commands brought behind usual servos", "no pot is there"),

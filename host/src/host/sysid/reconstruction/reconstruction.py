@@ -178,6 +178,49 @@ def reconstruct(
     return Compatibility(tuple(findings), rms, when, gps, instrument, tests, vanes)
 
 
+def _estimate(
+    name: str,
+    found: Mapping[str, tuple[float, float]],
+    priors: Mapping[str, tuple[float, float]],
+    vane_delay: tuple[float, float] | None,
+    *,
+    gps: bool,
+) -> SensorErrorEstimate:
+    """Return what is known of a sensor's error by the flight, else beforehand.
+
+    Parameters
+    ----------
+    name : str
+    found, priors : mapping
+        Value and deviation by the flight, and beforehand.
+    vane_delay : tuple of float, optional
+        The vanes' by the aircraft file.
+    gps : bool
+    """
+    sd = priors[name][1]
+    value, deviation = found.get(name, priors[name])
+    if not gps:
+        deviation = min(NO_GPS_INFLATION * deviation, sd)
+        if name == FLOW[1] and deviation < sd:
+            value, deviation = _beside_imu((value, deviation), sd, priors)
+    data_informed = deviation < POSTERIOR_PRIOR_RATIO * sd
+    reason = "" if data_informed else _reason(name, gps=gps)
+    if (
+        name == DELAYS[0]
+        and vane_delay is not None
+        and _known_better((value, deviation), vane_delay)
+    ):
+        sd, data_informed, reason = vane_delay[1], False, BY_FILE
+    return SensorErrorEstimate(
+        name=name,
+        value=value,
+        half_width=NORMAL_95 * deviation,
+        prior_half_width=NORMAL_95 * sd,
+        data_informed=data_informed,
+        reason=reason,
+    )
+
+
 def by_calibration_alone(
     instrument: SensorErrorModel, told: Compatibility | None = None
 ) -> Compatibility:
