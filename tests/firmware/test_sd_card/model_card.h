@@ -37,6 +37,7 @@ class ModelCard {
   uint32_t bytes = 0;         // on the bus since power-on
   bool is_fast = false;
   bool crc_on = false;
+  uint8_t resets = 0;   // CMD0
   uint8_t opened = 0;   // CMD25
   uint8_t stopped = 0;  // CMD12 and stop tokens
 
@@ -184,7 +185,13 @@ class ModelCard {
     }
     const uint32_t argument =
         static_cast<uint32_t>(command_[1]) << 24 | core::get_be24(command_ + 2);
-    execute(command_[0] & 0x3F, argument);
+    const uint8_t index = command_[0] & 0x3F;
+    // These have no argument: as every host sends them, their bits are 0.
+    const uint8_t bare[] = {0, 9, 10, 12, 55, 58};
+    for (const uint8_t one : bare) {
+      bad_commands = static_cast<uint16_t>(bad_commands + (one == index && argument != 0));
+    }
+    execute(index, argument);
   }
 
   void execute(uint8_t index, uint32_t argument) {
@@ -200,6 +207,7 @@ class ModelCard {
     switch (index) {
       case 0:
         idle_ = true;
+        ++resets;
         queue(1);
         return;
       case 8:

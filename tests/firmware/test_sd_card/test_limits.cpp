@@ -81,6 +81,30 @@ TEST_CASE("card: whichever command of the start is refused, it ends and says so"
   }
 }
 
+TEST_CASE("card: one that still programs is asked nothing, then reset once") {
+  for (uint8_t wraps = 0; wraps < 2; ++wraps) {
+    Life life;
+    if (wraps == 0) life.model.advance_us(100000);  // the clock begins shortly before its end
+    life.model.leave_busy(2000);
+    CHECK(life.start());
+    CHECK_EQ(life.model.resets, 1);
+    CHECK_EQ(life.model.bad_commands, 0);
+  }
+}
+
+TEST_CASE("card: one that programs for ever is reset behind a second") {
+  Life dead;
+  dead.model.leave_busy(0xFFFF);
+  const uint32_t from_us = dead.model.now_us();
+  dead.card.start();
+  while (dead.card.poll() && dead.model.resets == 0) {
+    dead.model.advance_us(200);
+  }
+  CHECK_EQ(dead.model.resets, 1);
+  CHECK(dead.model.now_us() - from_us > 1000000U);
+  CHECK(dead.model.now_us() - from_us < 1003000U);
+}
+
 TEST_CASE("card: the answer to CMD8 repeats its pattern and names 3.3 V") {
   const struct {
     uint8_t volts, echo;
