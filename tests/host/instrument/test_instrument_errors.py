@@ -42,7 +42,9 @@ def test_every_error_says_how_it_is_drawn_for_whom_and_by_whose_word() -> None:
         assert len(error.width) == len(error.sensors) > 0, error.name
         assert set(error.shared) <= set(error.sensors), error.name
         assert error.source, error.name
-        assert min(error.sigmas) > 0.0, error.name
+        # No error at all where an aircraft file tells it: no_file.toml has what it is without one.
+        told = {"vane_flow_share", "vane_ahead_m"}
+        assert min(error.sigmas) > 0.0 or error.name in told, error.name
 
 
 def test_lines_of_a_calibration_reach_identification(tmp_path: Path) -> None:

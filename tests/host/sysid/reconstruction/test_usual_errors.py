@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from host.instrument.deviations import unknown_sensors
+from host.instrument.instrument_errors import errors_without_file
 from host.instrument.recording_notes import recording_notes
 from host.physical.recording import Recording
 from host.sysid.reconstruction import prior
@@ -16,7 +17,8 @@ def test_priors_of_a_table_of_others_are_wide() -> None:
         assert theirs[name][1] > 1.7 * ours[name][1], name
 
 
-def test_it_is_said_and_of_ours_it_is_not() -> None:
+def test_it_is_said_and_of_ours_it_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("host.instrument.deviations.errors_without_file", errors_without_file)
     [note] = recording_notes(unknown_sensors(Recording(maker="foreign")))
     assert note.startswith("sensors of others: vanes may be wrong by 12 % and 1.6 deg")
     assert "[error.NAME]" in note
