@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import pytest
 from host.instrument.instrument_errors import InstrumentErrors, usual_errors
 
-OF_AIRSPEED = {"pitot_scale", "pitot_zero_pa", "density_share"}  # which their data tell
+# Which their data tell.
+OF_AIRSPEED = {"pitot_scale", "pitot_zero_pa", "density_share", "fuselage_heat_share"}
 
 
 def known_sensors(maker: str, *_: object) -> InstrumentErrors:
