@@ -117,11 +117,12 @@ def _input(
 ) -> AdvisedInput:
     surface, kind = INPUTS[motion]
     flown = sizes.get(surface, ())
-    size = LARGER * max(flown) if flown else USUAL_DEG[surface]
+    before = max(flown, default=USUAL_DEG[surface])
+    size = min(LARGER * before, LARGEST_DEG) if flown else before
     too_wide = max(
         (row.share / (CARE_SHARE if row.word == NOT else TRUST_SHARE) for row in rows), default=1.0
     )
-    more = max(len(flown), 1) * (too_wide**2 - 1.0) / LARGER**2
+    more = max(len(flown), 1) * (too_wide**2 - 1.0) * (before / size) ** 2
     count = int(min(max(math.ceil(more), 1), MOST))
     return AdvisedInput(
         surface, kind, float(max(round(size), 1)), _duration_s(motion, kind, period_s), count,
