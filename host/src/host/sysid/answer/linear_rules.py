@@ -9,6 +9,7 @@ import numpy as np
 
 from host.sysid.answer.correlated_inputs import derivatives_of_both
 from host.sysid.answer.doubt import Doubt, Evidence, doubt
+from host.sysid.answer.parameter_places import leaning_on
 from host.sysid.errors.systematic_errors import is_template, scaled_by_airspeed
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.validation.prediction_limits import FAILS, Prediction
@@ -44,6 +45,16 @@ def on_a_bound(answer: Answer, evidence: Evidence) -> list[Doubt]:
 def one_input_for_two(answer: Answer, evidence: Evidence) -> list[Doubt]:
     """Doubt inputs that moved as one, of which a regression left one out."""
     return _named(answer, derivatives_of_both(answer), "both inputs moved alike; one was left out")
+
+
+def motion_left_out(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """Doubt a reduced template where short records hide what other states do."""
+    if not answer.left_out:
+        return []
+    reason = (
+        f"{answer.template} leaves out {' and '.join(answer.left_out)}, and no interval counts it"
+    )
+    return _named(answer, leaning_on(answer.model, set(answer.model.states)), reason)
 
 
 def divided_by(answer: Answer, channel: str) -> set[str]:

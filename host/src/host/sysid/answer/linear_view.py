@@ -13,6 +13,7 @@ from host.sysid.answer.correlated_inputs import correlated_inputs
 from host.sysid.answer.feedback_pairs import alike_derivatives, combined_derivatives
 from host.sysid.answer.linear_rules import (
     divided_by,
+    motion_left_out,
     on_a_bound,
     one_input_for_two,
     unpredicted,
@@ -42,6 +43,7 @@ RULES: tuple[Rule, ...] = (
     input_feedback,
     own(on_a_bound),
     own(one_input_for_two),
+    own(motion_left_out),
     impossible_sign,
 )
 

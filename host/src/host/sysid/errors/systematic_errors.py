@@ -255,7 +255,10 @@ def add_systematic_covariance(result: FitResult, moved: Sequence[ShiftedEstimate
     known = result.uncertainty
     if not moved:
         return known
-    total = known.plus(consider_covariance(np.stack([m.estimate - result.estimate for m in moved])))
+    # What the fit left out stays out: no deviation of a sensor brings it back.
+    fitted = known.variance > 0.0
+    shifts = np.stack([np.where(fitted, m.estimate - result.estimate, 0.0) for m in moved])
+    total = known.plus(consider_covariance(shifts))
     # Welch-Satterthwaite: what is carried is no small sample of maneuvers.
     own = known.variance / np.maximum(total.variance, 1e-300)
     freedom = known.degrees_of_freedom / np.maximum(own, 1e-6) ** 2
