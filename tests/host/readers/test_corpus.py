@@ -141,4 +141,4 @@ def test_two_surfaces_that_are_exchanged() -> None:
     answer = identified("aileron_rudder_swapped.csv", ())
     control = identified(TABLE, ())
     marks = [one["answers"][0]["marks"]["L_da"]["mark"] for one in (answer, control)]
-    assert marks == ["do not rely on", "trust"]
+    assert marks == ["do not use", "trust"]

@@ -141,6 +141,13 @@ TEXTS: dict[str, Callable[[pd.DataFrame, Path], object]] = {
 NOTED = ("lines before", "sep=; of a spreadsheet")
 
 
+def beside_density(notes: list[str]) -> list[str]:
+    """Return notes without the one that every table without air has."""
+    kept = [note for note in notes if not note.startswith("density is not known")]
+    assert len(kept) == len(notes) - 1
+    return kept
+
+
 @pytest.mark.parametrize("dialect", TEXTS)
 def test_every_dialect_of_text_is_the_same_flight(
     dialect: str,
@@ -152,7 +159,7 @@ def test_every_dialect_of_text_is_the_same_flight(
     TEXTS[dialect](foreign, tmp_path / "x.csv")
     columns, notes = read(tmp_path / "x.csv")
     same(columns, flight)
-    assert bool(notes) == (dialect in NOTED), notes
+    assert bool(beside_density(notes)) == (dialect in NOTED), notes
 
 
 @pytest.mark.parametrize("shape", ["rows", "columns", "struct", "nested", "index", "text", "clock"])
@@ -360,8 +367,8 @@ def test_a_surface_that_works_backwards_is_told(
     turned += "" if turned != LINES[surface] else ", sign = -1"
     (tmp_path / "map.toml").write_text(text_of({**LINES, surface: turned}))
     _, notes = read_columns(tmp_path / "x.csv", tmp_path / "map.toml")
-    assert len(notes) == 1
-    assert notes[0].startswith(f"finding surface-sign: {surface} positive seems to")
+    [note] = beside_density(notes)
+    assert note.startswith(f"finding surface-sign: {surface} positive seems to")
 
 
 NUMBERED = {k: line.replace(line.split('"')[1], "{}") for k, line in LINES.items()}

@@ -5,16 +5,27 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from host.instrument.instrument_errors import InstrumentErrors, usual_errors
+from host.instrument.instrument_errors import (
+    InstrumentErrors,
+    errors_without_file,
+    usual_errors,
+)
+from host.physical.calibration import Calibration
 
 # Which their data tell.
 OF_AIRSPEED = {"pitot_scale", "pitot_zero_pa", "density_share", "fuselage_heat_share"}
 
 
-def known_sensors(maker: str, *_: object) -> InstrumentErrors:
-    """Return usual errors of the airspeed, and next to none of all else."""
+def known_sensors(maker: str, calibration: Calibration | None = None) -> InstrumentErrors:
+    """Return usual errors of the airspeed and of servos, and next to none of all else.
+
+    A calibration that a test gives says itself what its sensors are.
+    """
+    if calibration is not None:
+        return errors_without_file(maker, calibration)
     errors = usual_errors(maker)
-    return errors.scaled(0.01, *(e.name for e in errors if e.name not in OF_AIRSPEED))
+    kept = {e.name for e in errors if e.name.startswith("servo")} | OF_AIRSPEED
+    return errors.scaled(0.01, *(e.name for e in errors if e.name not in kept))
 
 
 @pytest.fixture(scope="package", autouse=True)

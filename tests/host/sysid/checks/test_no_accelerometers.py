@@ -32,7 +32,8 @@ def answer(flight: tuple[Columns, Columns], axis: str) -> Answer:
     }
     there = (t >= first) & (t < last)
     cut = {k: v[there] for k, v in {**measured, **late}.items() if k not in FORCES}
-    exact = usual_errors(FOREIGN).scaled(0.0, "pitot_scale", "pitot_zero_pa", "density_share")
+    usual = usual_errors(FOREIGN)
+    exact = usual.scaled(0.01, *(error.name for error in usual))
     [found] = identify(cut, names=(axis,), maker=FOREIGN, errors=exact)
     return found
 

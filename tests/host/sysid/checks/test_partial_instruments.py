@@ -291,8 +291,8 @@ def trainer() -> pd.DataFrame:
         # Of one axis: M_q was known to 43 %, N_p to 35.
         ((*LONGITUDINAL, "ax_mps2", "alpha_rad"), "longitudinal", {"M_alpha": 0.05, "M_q": 0.08}),
         (LATERAL_COLUMNS, "lateral", {"L_p": 0.06, "N_beta": 0.06, "N_p": 0.4}),
-        # Without a vane, by one accelerometer: refused before.
-        (LONGITUDINAL, "longitudinal", {"Z_alpha": 0.1, "M_alpha": 0.06, "M_q": 0.1, "M_de": 0.04}),
+        # Without a vane, by one accelerometer: refused before. The airspeed's scale is in them.
+        (LONGITUDINAL, "longitudinal", {"Z_alpha": 0.1, "M_alpha": 0.06, "M_q": 0.1, "M_de": 0.05}),
         (LONGITUDINAL, "short-period", {"M_q": 0.3, "M_de": 0.1}),
     ],
 )

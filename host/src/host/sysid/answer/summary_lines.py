@@ -19,6 +19,7 @@ VALUE_CELL = 30  # name, words and value
 MOST_PERCENT = 99
 DONE = 36  # of a finding: what was done
 REST = "Rest: --full, --json, --plots DIR, host report"
+LOST = "the log is "  # begins the note on it (flight/log_columns.py)
 
 
 def summary_lines(
@@ -34,7 +35,14 @@ def summary_lines(
     table : sequence of str, optional
         In place of the estimates, a line each: several methods side by side.
     """
-    above = [known_line(summary), *_packed([one.text for one in summary.modes], "  ", COLUMNS)]
+    # Nothing that was read of a log is said before what the log lost.
+    lost = [note for note in notes if note.startswith(LOST)]
+    notes = [note for note in notes if note not in lost]
+    above = [
+        *lost,
+        known_line(summary),
+        *_packed([one.text for one in summary.modes], "  ", COLUMNS),
+    ]
     not_known = _not_known(summary)
     said = counted(notes)
     rows = list(filter(None, table)) if table is not None else _two_columns(summary)
