@@ -261,6 +261,8 @@ class _Reading:
 
     def _is_new(self, data: bytes, at: int) -> bool:
         """Return whether the subscription there is the first of its number, and is taken."""
+        if at + _MESSAGE_HEAD + 3 > len(data):  # cut off before its number
+            return False
         number = data[at + 4] | data[at + 5] << 8
         return self._subscribed < MOST_SUBSCRIPTIONS and not self._most[number]
 
