@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+LOST = "the log is"  # begins the note on what a log lost, which is said before all else
 # cause -> explanation for people
 CAUSES = {
     "crc": "blocks with wrong bits",

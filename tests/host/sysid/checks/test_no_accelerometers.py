@@ -33,7 +33,7 @@ def answer(flight: tuple[Columns, Columns], axis: str) -> Answer:
     there = (t >= first) & (t < last)
     cut = {k: v[there] for k, v in {**measured, **late}.items() if k not in FORCES}
     usual = usual_errors(FOREIGN)
-    exact = usual.scaled(0.01, *(error.name for error in usual))
+    exact = usual.scaled(0.0, *(error.name for error in usual))
     [found] = identify(cut, names=(axis,), maker=FOREIGN, errors=exact)
     return found
 

@@ -85,4 +85,6 @@ def test_a_calibration_is_no_good_for_a_table(tmp_path: Path) -> None:
     rows = [f"{0.02 * k:.2f},17.0" for k in range(60)]
     (tmp_path / "x.csv").write_text("\n".join(["t_s,airspeed_mps", *rows]))
     _, notes = read_columns(tmp_path / "x.csv", calibration=tmp_path / "c.toml")
-    assert notes[0] == "a calibration is for logs: here only its standard deviations count"
+    of_calibration, of_air = notes
+    assert of_calibration == "a calibration is for logs: here only its standard deviations count"
+    assert of_air.startswith("density is not known")

@@ -40,7 +40,6 @@ class ArduPlaneLoop:
     scaler: float
     fixed: Mapping[str, float]
     share: float = 1.0
-    tas_ratio: float = 1.0
     states: int = field(default=4, init=False)
 
     @property
@@ -61,12 +60,7 @@ class ArduPlaneLoop:
         slope = (error - state[..., 1]) / dt
         derivative = state[..., 2] + share("FLTD_hz") * (slope - state[..., 2])
         integral = state[..., 3] + g["I"] * error * dt
-        out = (
-            g["FF"] * target / (s * self.tas_ratio)
-            + g["P"] * error
-            + g["D"] * derivative
-            + integral
-        )
+        out = g["FF"] * target / s + g["P"] * error + g["D"] * derivative + integral
         return np.stack([target, error, derivative, integral], axis=-1), out / FULL_RAD * self.share
 
 

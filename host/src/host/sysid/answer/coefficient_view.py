@@ -12,6 +12,7 @@ import numpy as np
 from host.sysid.answer.doubt import Doubt, Evidence, doubt
 from host.sysid.answer.marks import Judged, share_text
 from host.sysid.answer.trust_rules import (
+    ENTANGLED,
     Rule,
     impossible_sign,
     input_feedback,
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 
 WORSE = 1.25  # NRMSE of unseen over fitted maneuvers: more is a model that does not carry over
 EXCITED = "the inputs excite it too little"
-ENTANGLED = 0.9  # correlation: what is wrong of one is wrong of both
 FORCES = ("CL", "CD", "CX", "CZ")
 # Channel to the equations whose response it makes, and to the labels it multiplies; "" is all.
 LEANING: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {

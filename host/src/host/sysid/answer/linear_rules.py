@@ -1,4 +1,4 @@
-"""What only a linear model can break: bounds, delays, lags, other methods, what inputs drive."""
+"""What only a linear model can break: bounds, inputs and motion left out, what is not predicted."""
 
 from __future__ import annotations
 
@@ -20,12 +20,6 @@ if TYPE_CHECKING:
 
 AIRSPEED = "airspeed_mps"
 WORSE_THAN_NONE = 1.0  # NRMSE: the mean would do better
-# Of power along what inputs drive over that of noise: half-widths are more than doubled by it.
-LARGE_RATIO = 4.0
-# What they drive, over an output's motion: below it widening answers for it. Right models of logs
-# in calm air show 0.4 to 2.1 %, a hidden lag 10 to 45, softening by 40 % 4 to 15 (laterally),
-# airspeed that is 10 % wrong 3 to 6.
-MATERIAL = 0.025
 WHITE_P = 0.01  # of Ljung-Box: above it the residual is a sensor's noise
 NEAR_BOUND = 1e-6  # of a bound's distance to the start, or of its size
 

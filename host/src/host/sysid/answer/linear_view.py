@@ -22,6 +22,7 @@ from host.sysid.answer.marks import SMALL, UNSURE, USELESS, Judged, mark_of, sha
 from host.sysid.answer.parameter_places import leaning_on
 from host.sysid.answer.servo_lines import servo_lines
 from host.sysid.answer.trust_rules import (
+    ENTANGLED,
     Rule,
     impossible_sign,
     input_feedback,
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from host.sysid.checks.data_finding import Feedback, Finding
     from host.sysid.linear.linear_answer import Answer
 
-ENTANGLED = 0.9  # correlation: what is wrong of one is wrong of both
 PLACE = "imu_"  # begins the name of a sensor's place: no property of the aircraft
 RULES: tuple[Rule, ...] = (
     open_finding,

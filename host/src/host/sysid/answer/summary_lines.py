@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from host.constants import CARE_SHARE, TRUST_SHARE
+from host.log.ledger import LOST
 from host.sysid.answer.answer_summary import AnswerSummary, counted
 from host.sysid.answer.known_axes import MOVERS
 
@@ -19,7 +20,6 @@ VALUE_CELL = 30  # name, words and value
 MOST_PERCENT = 99
 DONE = 36  # of a finding: what was done
 REST = "Rest: --full, --json, --plots DIR, host report"
-LOST = "the log is "  # begins the note on it (flight/log_columns.py)
 
 
 def summary_lines(
@@ -36,8 +36,8 @@ def summary_lines(
         In place of the estimates, a line each: several methods side by side.
     """
     # Nothing that was read of a log is said before what the log lost.
-    lost = [note for note in notes if note.startswith(LOST)]
-    notes = [note for note in notes if note not in lost]
+    lost = counted(note for note in notes if note.startswith(LOST))
+    notes = [note for note in notes if not note.startswith(LOST)]
     above = [
         *lost,
         known_line(summary),

@@ -10,6 +10,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.errors import IdentificationError
+from host.log.ledger import LOST
 from host.readers.even_grid import USED
 from host.readers.foreign_tables import Foreign, is_text
 from host.readers.recorded import recording_of_log
@@ -87,7 +88,7 @@ def columns_of(log: FlightLog, wanted: Collection[str]) -> tuple[dict[str, Array
         loss = log.loss
         lost = f"{loss.seconds:.2f} s and {loss.lost_bytes} bytes lost" if loss.any else ""
         said = "; ".join(filter(None, (lost, loss.ending)))
-        notes.append(f"the log is {log.complete}: {said} (`host decode` names every place)")
+        notes.append(f"{LOST} {log.complete}: {said} (`host decode` names every place)")
     poor_columns = [c for c in calibration_note(log)["default_columns"] if c in USED]
     if poor_columns:
         notes.append(

@@ -112,12 +112,6 @@ class InputCoherence:
         powers = dict(zip(self.outputs, self._weights(), strict=True))
         return tuple(name for name in self.coherent if powers[name] >= ratio)
 
-    def driven_shares(self) -> dict[str, float]:
-        """Return of each output the part of its residual's deviation that the inputs drive."""
-        driven = self.ratio * self.columns
-        shares = np.sqrt(driven / (self.samples + driven))
-        return dict(zip(self.outputs, map(float, shares), strict=True))
-
     def _outputs_at(self, significance: float) -> tuple[str, ...]:
         """Return the outputs that either test names; each test takes half of the level."""
         level = 1.0 - (1.0 - 0.5 * significance) ** (1.0 / len(self.outputs))

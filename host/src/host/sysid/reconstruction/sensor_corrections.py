@@ -77,6 +77,8 @@ def pressure_share(found: Compatibility) -> float:
     """Return the share of an error of V squared that is due to the pitot, not to density."""
     total = found["pitot_scale"].prior_half_width / NORMAL_95
     density = density_share(found.instrument)
+    if not density > 0.0:
+        return 1.0
     return max(1.0 - (density / max(total, density)) ** 2, LEAST_PRESSURE_SHARE)
 
 
