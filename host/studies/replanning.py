@@ -17,10 +17,10 @@ from pathlib import Path
 
 from host.aircraft.linear_aircraft import load
 from host.live.estimates.flight_estimate import FlightEstimate, FlightEstimator
-from host.live.estimates.wanted_widths import WANTED_PERCENT
 from host.planning.card_design import design
 from host.planning.next_point import NextPoints, in_words
 from host.planning.optimal_card import standard_card
+from host.planning.wanted_widths import WANTED_PERCENT
 from host.twin.testcard.cards import Card, Pilot, Segment, length_s
 
 from studies.radio_flights import RadioFlight, after_each_point, radio_flight

@@ -18,7 +18,7 @@ import numpy as np
 from host.aircraft.mass_properties import airframe_data
 from host.errors import IdentificationError
 from host.live.estimates.flight_estimate import FlightEstimate, FlightEstimator
-from host.live.estimates.wanted_widths import WANTED_PERCENT
+from host.planning.wanted_widths import WANTED_PERCENT
 from host.sysid.answer import true_coefficients
 from host.sysid.pipeline import identify
 from host.twin.testcard.cards import Card, load

@@ -12,10 +12,10 @@ from host.errors import IdentificationError
 from host.live.estimates import flight_estimate
 from host.live.estimates.estimate_worker import EstimateWorker
 from host.live.estimates.flight_estimate import FlightEstimator
-from host.live.estimates.wanted_widths import WANTED_PERCENT
 from host.live.test_point.point_estimate import PointEstimate, PointEstimator
 from host.planning.point_widths import PointPromise, point_derivatives
 from host.planning.predicted_widths import PredictedWidth
+from host.planning.wanted_widths import WANTED_PERCENT
 from host.sysid.flight import ReconstructedFlight
 from host.sysid.maneuvers import DetectedManeuver, detect_maneuvers
 from host.twin.testcard.cards import Card, load

@@ -11,8 +11,8 @@ import pytest
 from host.errors import UsageError
 from host.live.estimates.estimate_worker import Answered, EstimateWorker
 from host.live.estimates.live_estimates import LiveEstimates, live_estimates
-from host.live.estimates.wanted_widths import WANTED_PERCENT, wanted_widths
 from host.planning.next_point import NextPoint
+from host.planning.wanted_widths import WANTED_PERCENT, wanted_widths
 from host.twin.testcard.cards import Segment
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 from host.live.estimates.flight_estimate import FlightEstimate
-from host.live.estimates.wanted_widths import WANTED_PERCENT
 from host.planning.next_point import KnownWidth
+from host.planning.wanted_widths import WANTED_PERCENT
 from studies import replanning
 
 

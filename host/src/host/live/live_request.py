@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from host.aircraft.file import load_measured
 from host.errors import UsageError
 from host.extras import install_hint
-from host.live.estimates.wanted_widths import wanted_widths
 from host.live.live_session import LiveSession
 from host.live.live_sources import (
     Source,
@@ -21,6 +20,7 @@ from host.live.live_sources import (
 from host.live.replay import RADIO_RATE_HZ, replay_source
 from host.live.udp_place import udp_place
 from host.physical.calibration import Calibration
+from host.planning.wanted_widths import wanted_widths
 from host.wire.flight_card import card_file
 
 if TYPE_CHECKING:

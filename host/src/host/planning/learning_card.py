@@ -32,15 +32,13 @@ from host.planning.onboard_sums import (
     YAW,
     AxisCard,
 )
+from host.planning.wanted_widths import OTHERS_PERCENT, WANTED_PERCENT
 from host.twin.testcard.cards import Card
 from host.wire.schema_text import packed_schema
 
 # Evenly over the band that a 3-2-1-1 or a multisine of a small aircraft fills, 0.3 to 3.8 Hz.
 TEN_HARMONICS = (3, 7, 11, 15, 19, 23, 27, 31, 35, 39)
 SIX_HARMONICS = (4, 9, 14, 19, 24, 29)
-ENOUGH_PERCENT: Mapping[str, tuple[int, ...]] = {
-    PITCH: (10, 20, 10), "roll": (20, 15, 50, 15, 50), YAW: (10, 50, 20, 50, 10),
-}  # fmt: skip
 NAMES: Mapping[str, tuple[str, ...]] = {
     axis: tuple(f"{row}_{signal}" for signal in SIGNALS[axis])
     for axis, row in ((PITCH, "Cm"), ("roll", "Cl"), (YAW, "Cn"))
@@ -119,7 +117,9 @@ def learning_card(
         product=_product(axis, airframe),
         gain=tuple(g * rate / s for g, s in zip(gains, slopes, strict=True)),
         tolerance=tuple(_tolerances(aircraft, axis, airframe, sensors, at, gains).tolist()),
-        wanted_percent=ENOUGH_PERCENT[axis],
+        wanted_percent=tuple(
+            round(WANTED_PERCENT.get(name, OTHERS_PERCENT)) for name in NAMES[axis]
+        ),
     )
 
 

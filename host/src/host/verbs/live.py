@@ -48,7 +48,7 @@ def add_parser(subparsers: Any) -> None:
                         " flies")  # fmt: skip
     parser.add_argument("--wanted", metavar="PERCENT",
                         help="half-widths to reach, per cent of each value: 8, or"
-                        " Cm_q=15,Cn_r=25 (default 10 to 20)")  # fmt: skip
+                        " Cm_q=15,Cn_r=25 (default 10)")  # fmt: skip
     parser.add_argument("--baud", type=_whole, metavar="N",
                         help="baud rate (default: radio 57600, a Mega's USB 115200)")  # fmt: skip
     parser.add_argument("--rate", type=_rate, default=20.0, metavar="HZ",

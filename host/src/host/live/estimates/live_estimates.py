@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from host.aircraft.file import load_measured
 from host.live.estimates.estimate_worker import Answered, EstimateWorker
-from host.live.estimates.wanted_widths import wanted_widths
+from host.planning.wanted_widths import wanted_widths
 
 if TYPE_CHECKING:
     from host.planning.next_point import NextPoint

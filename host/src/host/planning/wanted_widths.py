@@ -1,17 +1,21 @@
-"""Which half-widths are wanted: the principal derivatives, in per cent of their values."""
+"""Which half-widths are wanted: principal derivatives trusted, others for use with care."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
+from host.constants import CARE_SHARE, TRUST_SHARE
 from host.errors import UsageError
 from host.near_names import like
 
-# What a first report is worth: statics and controls to a tenth, damping to a fifth.
-WANTED_PERCENT: Mapping[str, float] = {
-    "CL_alpha": 10.0, "Cm_alpha": 10.0, "Cm_q": 20.0, "Cm_de": 10.0,
-    "Cl_p": 15.0, "Cl_da": 15.0, "Cn_beta": 10.0, "Cn_r": 20.0, "Cn_dr": 10.0,
-}  # fmt: skip
+WANTED_PERCENT: Mapping[str, float] = dict.fromkeys(
+    (
+        "CL_alpha", "Cm_alpha", "Cm_q", "Cm_de",
+        "Cl_p", "Cl_da", "Cn_beta", "Cn_r", "Cn_dr",
+    ),
+    100.0 * TRUST_SHARE,
+)  # fmt: skip
+OTHERS_PERCENT = 100.0 * CARE_SHARE
 _MOST_PERCENT = 1000.0
 
 
