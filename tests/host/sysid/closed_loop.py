@@ -25,9 +25,7 @@ class Law:
     washout_s: float = np.inf
 
 
-def flown(
-    name: str, inputs: dict[str, Array], law: Law | None, seed: int, gust_rad: float = GUST_RAD
-) -> dict[str, Array]:
+def flown(name: str, inputs: dict[str, Array], law: Law | None, seed: int) -> dict[str, Array]:
     """Return the columns of a flight of a template in light gusts, by the rule of midpoints."""
     rng = np.random.default_rng(seed)
     model = template(name, Trim(17.0, 0.06, 0.06))
@@ -37,7 +35,7 @@ def flown(
     gust = np.zeros(count)
     for k in range(1, count):
         gust[k] = gust[k - 1] * (1.0 - dt / GUST_S)
-        gust[k] += gust_rad * np.sqrt(2.0 * dt / GUST_S) * rng.standard_normal()
+        gust[k] += GUST_RAD * np.sqrt(2.0 * dt / GUST_S) * rng.standard_normal()
     moved = np.zeros((count, len(model.inputs)))  # within each fine step
     given = np.zeros_like(moved[::FINE])
     for surface, values in inputs.items():
@@ -86,48 +84,3 @@ def doublets(samples: int, starts: tuple[int, ...], side_s: float, size_rad: flo
         u[start : start + side] = size_rad
         u[start + side : start + 2 * side] = -size_rad
     return u
-
-
-def tracked(
-    seed: int, leg_s: float, duration_s: float = 64.0, *, line: bool = False
-) -> dict[str, Array]:
-    """Return the columns of a lateral flight that holds headings, a new one each leg.
-
-    aileron = 0.5 (bank wanted - bank) - 0.06 p, 40 ms late; bank wanted is 0.6 of the error of the
-    heading, at most 0.5. With a `line` it is the same one all along, and heading is wanted towards
-    it, 0.02 rad a metre of distance, which is another one each leg. The rudder flies doublets. No
-    column has the heading; the gyro about z has a bias of 0.2 deg/s.
-    """
-    rng = np.random.default_rng(seed)
-    model = template("lateral", Trim(17.0, 0.06, 0.06))
-    A, B, C, D = model.matrices(np.array([TRUTH["lateral"][p.name] for p in model.parameters]))
-    at = {name: k for k, name in enumerate((*model.states, *model.inputs))}
-    beta, p, r, phi = (at[name] for name in ("beta_rad", "p_radps", "r_radps", "phi_rad"))
-    samples, dt = round(duration_s / DT_S), DT_S / FINE
-    rudder = doublets(samples, tuple(range(100, samples - 60, 350)), 0.3, 0.1)
-    turns = rng.uniform(-1.2, 1.2, int(duration_s / leg_s) + 1)
-    wanted = np.repeat(np.cumsum(turns), round(leg_s / DT_S))[:samples]
-    aside_m = 20.0 * np.repeat(turns, round(leg_s / DT_S))[:samples]
-    drift_m = 0.0
-    states, inputs = np.zeros((samples, len(A))), np.zeros((samples, len(model.inputs)))
-    x, heading, gust, late = np.zeros(len(A)), 0.0, 0.0, round(0.04 / dt)
-    past: list[tuple[float, float, float]] = []
-    for k in range(samples * FINE):
-        row = k // FINE
-        past.append((x[phi], x[p], heading))
-        bank, roll_rate, then = past[max(0, k - late)]
-        course = -float(np.clip(0.02 * (aside_m[row] + drift_m), -0.6, 0.6))
-        inner = float(np.clip(0.6 * ((course if line else wanted[row]) - then), -0.5, 0.5))
-        u = np.zeros(len(model.inputs))
-        u[model.inputs.index("aileron_rad")] = 0.5 * (inner - bank) - 0.06 * roll_rate
-        u[model.inputs.index("rudder_rad")] = rudder[row]
-        if k % FINE == 0:
-            states[row], inputs[row] = x, u
-            states[row, beta] += gust
-        gust += -gust * dt / GUST_S + GUST_RAD * np.sqrt(2.0 * dt / GUST_S) * rng.standard_normal()
-        heading += dt * x[r]
-        drift_m += dt * 17.0 * float(np.sin(heading))
-        x = x + dt * (A @ x + B @ u + A[:, beta] * gust)
-    columns = _recorded(model, (C, D), states, inputs, rng)
-    gyro_bias = np.radians(0.2)
-    return columns | {"q_radps": np.zeros(samples), "r_radps": columns["r_radps"] + gyro_bias}

@@ -5,44 +5,30 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from host.arrays import Array, IntArray
 from host.sysid.checks.data_finding import Feedback, Finding
 from host.sysid.maneuvers.maneuver_detection import LEAD_S, STILL_RAD, DetectedManeuver, runs_of
 from host.sysid.maneuvers.maneuver_selection import FEWEST
-from host.sysid.numerics.feedback_fast import fast_feedback
-from host.sysid.numerics.feedback_legs import feedback_legs
 from host.sysid.numerics.state_feedback import FeedbackLaw, feedback_law
 from host.sysid.numerics.white_noise import white_deviation
 
-LATERAL = ("p_radps", "r_radps", "beta_rad", "phi_rad", "psi_rad")
-# What a surface may follow, and by whose maneuvers it is judged.
+# What a surface may follow of what forces depend on: one that follows attitude or height is as good
+# as a pilot's input.
+LATERAL = ("p_radps", "r_radps", "beta_rad")
 FOLLOWED = {
-    "elevator_rad": ("q_radps", "alpha_rad", "theta_rad", "airspeed_mps", "altitude_m"),
+    "elevator_rad": ("q_radps", "alpha_rad", "airspeed_mps"),
     "aileron_rad": LATERAL,
     "rudder_rad": LATERAL,
 }
+# By whose maneuvers it is judged.
 COUPLED_SURFACES = {"aileron_rad": ("rudder_rad",), "rudder_rad": ("aileron_rad",)}
-# No force depends on these: what follows them alone is as good as a pilot's input.
-ATTITUDE = ("phi_rad", "theta_rad", "psi_rad", "altitude_m")
 # Which way a law moves a surface that is to hold the aircraft. An aircraft that answers slow inputs
 # of a pilot moves the other way.
 HOLDING = {
     ("elevator_rad", "q_radps"): 1, ("elevator_rad", "alpha_rad"): 1,
-    ("elevator_rad", "theta_rad"): 1,
-    ("aileron_rad", "p_radps"): -1, ("aileron_rad", "phi_rad"): -1,
-    ("aileron_rad", "psi_rad"): -1,
-    ("rudder_rad", "r_radps"): 1, ("rudder_rad", "beta_rad"): -1,
+    ("aileron_rad", "p_radps"): -1, ("rudder_rad", "r_radps"): 1, ("rudder_rad", "beta_rad"): -1,
 }  # fmt: skip
-# What a waypoint tracker's bank loop follows in every leg, and what in some.
-BANK_LOOP, HEADING = ("p_radps", "phi_rad"), "psi_rad"
-# What holds an attitude whose command is not in the table: rate, attitude, and what may be beside.
-INNER_LOOP: dict[str, tuple[str, ...]] = {
-    "aileron_rad": ("p_radps", "phi_rad", "psi_rad"),
-    "elevator_rad": ("q_radps", "theta_rad", "alpha_rad"),
-}
-TURNING = ("p_radps", "q_radps", "r_radps", "phi_rad", "theta_rad")  # tell how angles change
 MOMENT = {"elevator_rad": "M", "aileron_rad": "L", "rudder_rad": "N"}
 LABEL = {
     "elevator_rad": "de", "aileron_rad": "da", "rudder_rad": "dr", "airspeed_mps": "V",
@@ -79,28 +65,17 @@ def _finding(
 ) -> Finding | None:
     names = [n for n in FOLLOWED[surface] if n in columns]
     windows = _windows(columns, maneuvers, surface)
-    law, jumps = _law(columns, windows, surface, names), ""
-    if law is None and surface == "aileron_rad":
-        law, jumps = _tracker(columns, windows)
-    if law is None:
-        law, jumps = _inner_loop(columns, windows, surface)
+    law = _law(columns, windows, surface, names)
     if law is None:
         return None
-    aerodynamic: FeedbackLaw | None = law
-    if set(law.signals) & set(ATTITUDE):
-        names = [n for n in names if n not in ATTITUDE]
-        aerodynamic = _law(columns, windows, surface, names)
-    said = f"{surface} {law_words(law)}{jumps}"
+    said = f"{surface} {law_words(law)}"
     causes = CAUSES.get(surface, CAUSES[""])
-    if aerodynamic is None:
-        done = "derivatives keep their marks: no force depends on attitude or height"
-        return Finding("feedback", (), said, causes, done)
     letter, own = MOMENT[surface], LABEL[surface]
-    alike = [f"{letter}_{LABEL[n]}" for n in (surface, *aerodynamic.signals)]
-    filtered = len(_filters(aerodynamic)) > 0
+    alike = [f"{letter}_{LABEL[n]}" for n in (surface, *law.signals)]
+    filtered = len(_filters(law)) > 0
     sums = [
         f"{letter}_{LABEL[n]} {'-' if gain < 0.0 else '+'} {abs(gain):.2g} {letter}_{own}"
-        for n, gain in zip(aerodynamic.signals, aerodynamic.gains, strict=True)
+        for n, gain in zip(law.signals, law.gains, strict=True)
     ]
     determined = "what they do together" if filtered else " and ".join(sums)
     return Finding(
@@ -109,7 +84,7 @@ def _finding(
         f"{said}: {', '.join(alike[:-1])} and {alike[-1]} are not separable",
         causes,
         f"only {determined} is known of them; other derivatives keep their marks",
-        feedback=Feedback(surface, aerodynamic.signals, aerodynamic.gains, filtered),
+        feedback=Feedback(surface, law.signals, law.gains, filtered),
     )
 
 
@@ -145,76 +120,6 @@ def _law(
     if law is None or HOLDING.get((surface, law.signals[0]), 0) * law.gains[0] < 0.0:
         return None
     return law
-
-
-def _tracker(
-    columns: Mapping[str, Array], windows: Sequence[IntArray]
-) -> tuple[FeedbackLaw | None, str]:
-    """Return the law of ailerons whose command jumps from leg to leg, and that in words.
-
-    Bank is among its signals, and each acts as it does where an aircraft is held: constants of the
-    legs leave little of a pilot's inputs but what the aircraft answers, and that moves the other
-    way.
-    """
-    if not windows or any(name not in columns for name in BANK_LOOP):
-        return None, ""
-    dt_s, moved = _period_s(columns), columns["aileron_rad"]
-    signals = {n: columns[n] for n in BANK_LOOP}
-    inner, heading = np.column_stack(list(signals.values())), _heading(columns)
-    legs, followed = feedback_legs(dt_s, moved, inner, heading, windows)
-    if followed is not None:
-        signals[HEADING] = followed
-    noise = _noise({**columns, **signals}, windows, "aileron_rad", list(signals))
-    law = feedback_law(dt_s, moved, signals, legs, noise)
-    if law is None or "phi_rad" not in law.signals:
-        return None, ""
-    gains = zip(law.signals, law.gains, strict=True)
-    if any(HOLDING["aileron_rad", name] * gain < 0.0 for name, gain in gains):
-        return None, ""
-    by_rates = ", heading by rates" if HEADING in law.signals and HEADING not in columns else ""
-    return law, f" within {len(legs)} legs of constant command{by_rates}"
-
-
-def _inner_loop(
-    columns: Mapping[str, Array], windows: Sequence[IntArray], surface: str
-) -> tuple[FeedbackLaw | None, str]:
-    """Return the law of a surface whose command no column tells, and that in words.
-
-    A guidance by the distance from a line or by a waypoint moves it slowly. What an aircraft
-    answers to a pilot has the other sign. Bank and heading are those by rates where these are
-    there: noise of a measured angle hides most of its quick part.
-    """
-    names = INNER_LOOP.get(surface, ())
-    if not names or not windows or any(name not in columns for name in names[:2]):
-        return None, ""
-    signals = {n: columns[n] for n in names if n in columns}
-    if surface == "aileron_rad":
-        signals |= _angles_by_rates(columns)
-    noise = _noise({**columns, **signals}, windows, surface, list(signals))
-    law = fast_feedback(_period_s(columns), columns[surface], signals, windows, noise)
-    if law is None or not set(ATTITUDE) & set(law.signals):
-        return None, ""
-    gains = zip(law.signals, law.gains, strict=True)
-    if any(HOLDING[surface, name] * gain < 0.0 for name, gain in gains):
-        return None, ""
-    by_rates = ", heading by rates" if HEADING in law.signals and HEADING not in columns else ""
-    return law, f", about a command that changes slowly{by_rates}"
-
-
-def _heading(columns: Mapping[str, Array]) -> Array | None:
-    """Return heading; where no column has it, by rates: its drift is little within a leg."""
-    return columns[HEADING] if HEADING in columns else _angles_by_rates(columns).get(HEADING)
-
-
-def _angles_by_rates(columns: Mapping[str, Array]) -> dict[str, Array]:
-    """Return bank and heading by the integrals of the body rates; empty where one is missing."""
-    if any(name not in columns for name in TURNING):
-        return {}
-    p, q, r, phi, theta = (columns[name] for name in TURNING)
-    heading_rate = (q * np.sin(phi) + r * np.cos(phi)) / np.cos(theta)
-    rates = {"phi_rad": p + np.sin(theta) * heading_rate, HEADING: heading_rate}
-    dt_s = _period_s(columns)
-    return {n: cumulative_trapezoid(v, dx=dt_s, initial=0) for n, v in rates.items()}
 
 
 def _noise(
