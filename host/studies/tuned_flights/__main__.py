@@ -75,16 +75,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"no gains: {', '.join(missing) or 'an axis'}")
         return 1
     laws = {one.axis: one.problem.structure for one in found.axes}
-    sets = {
-        "tuned": {one.axis: dict(one.design.gains or {}) for one in found.axes},
-        "default": {a: {r: s.default for r, s in laws[a].settings.items()} for a in AXES},
-    }
+    sets = {"tuned": {one.axis: dict(one.design.gains or {}) for one in found.axes}}
+    if found.autopilot.words:
+        sets["default"] = {a: {r: s.default for r, s in laws[a].settings.items()} for a in AXES}
     drawn = from_covariance(found, asked.aircraft_drawn, asked.first)
     print(f"{drawn[0]} of {drawn[1]} linear aircraft of the answer's covariance are unstable\n")
     with ProcessPoolExecutor(PROCESSES, initializer=prefer_machine_code) as processes:
-        for (name, gains), part in zip(sets.items(), (1, DEFAULT_PART), strict=True):
+        for (name, gains), part in zip(sets.items(), (1, DEFAULT_PART), strict=False):
             seeds = range(asked.first, asked.first + max(asked.aircraft_drawn // part, 1))
-            flown = Flights(Craft(laws, gains), seeds, processes)
+            flown = Flights(Craft(laws, gains, found.autopilot.travel_rad), seeds, processes)
             print(markdown(flown.table(f"{asked.autopilot}, {name} gains")), flush=True)
     return 0
 
@@ -105,6 +104,7 @@ class Craft:
 
     laws: Mapping[str, Structure]
     gains: Gains
+    full_rad: float | None = None
 
     def loop(
         self, seed: int, speed_mps: float, servo: float = 1.0, back: float = 0.0
@@ -119,7 +119,8 @@ class Craft:
             cg_m=frame.cg_m - np.array([back * frame.chord_m, 0.0, 0.0]),
         )
         pulse_s = float(rng.uniform(0.0, PULSE_PERIOD_S))
-        return ClosedLoop(frame, solve(frame, speed_mps), self.laws, self.gains, pulse_s)
+        at = solve(frame, speed_mps)
+        return ClosedLoop(frame, at, self.laws, self.gains, pulse_s, self.full_rad)
 
     def fly(
         self, seed: int, *, speed: float, demand: Demand, gusts: float, changes: tuple[float, ...]

@@ -68,6 +68,8 @@ class ClosedLoop:
         By axis and role.
     pulse_s : float
         By how much pulses come behind the law's step.
+    full_rad : float or None
+        Angle of the surface at an output of 1; None is the end of its travel.
     coordinated : bool
         Whether pitch is fed the rate of a turn, as ArduPlane and PX4 do.
     """
@@ -77,6 +79,7 @@ class ClosedLoop:
     laws: Mapping[str, Structure]
     gains: Mapping[str, Mapping[str, float]]
     pulse_s: float = 0.5 * PULSE_PERIOD_S
+    full_rad: float | None = None
     coordinated: bool = True
 
 
@@ -160,10 +163,9 @@ def fly(
             if (k * parts + j - first_pulse) % pulse_steps == 0:
                 for axis in AXES:
                     number = COMMANDS[axis]
-                    share = min(max(total[axis], -1.0), 1.0) * SENSE[axis]
-                    held[number] = (
-                        loop.trim.command[number] + share * frame.surface_limit_rad[number]
-                    )
+                    limit = frame.surface_limit_rad[number]
+                    angle = min(max(total[axis] * (loop.full_rad or limit), -limit), limit)
+                    held[number] = loop.trim.command[number] + angle * SENSE[axis]
             if turbulence_mps > 0.0:
                 noise = rng.standard_normal(4)
                 gust_step(dryden, gusts, noise, speed, frame.span_m, span, moved)

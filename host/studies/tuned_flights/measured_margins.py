@@ -64,7 +64,7 @@ def computed(loop: ClosedLoop, axis: str) -> Margins:
     """Return the margins of one axis of this very aircraft, from its equations at its trim."""
     system, servo_hz, delay_s = computed_parts(loop, axis)
     law = loop.laws[axis].loop(loop.gains[axis], loop.trim.airspeed_mps)
-    travel = float(loop.frame.surface_limit_rad[COMMANDS[axis]])
+    travel = loop.full_rad or float(loop.frame.surface_limit_rad[COMMANDS[axis]])
     plant = sampled(
         continuous(axis, system, travel, servo_hz, loop.laws[axis].gyro_filter_hz, SENSE[axis]),
         delay_s,

@@ -8,11 +8,12 @@ import control
 import numpy as np
 import pytest
 from host.arrays import Array
-from host.control.autopilots import ardupilot, inav, px4
+from host.control.autopilots import ardupilot, inav, mega, px4
 from host.control.autopilots.known import AUTOPILOTS
 from host.control.autopilots.structure import state_space
 from host.control.margins import FAR_DB, margins
 from host.control.plant import continuous, sampled
+from host.control.scenarios import law_response
 
 
 def test_margins_of_a_loop_that_is_worked_by_hand() -> None:
@@ -72,6 +73,7 @@ GAINS = {
     "ardupilot": {"P": 0.15, "I": 0.2, "D": 0.004, "FF": 0.3, "TC": 0.45},
     "px4": {"P": 0.15, "I": 0.2, "D": 0.01, "FF": 0.3, "TC": 0.45},
     "inav": {"P": 9.0, "I": 7.0, "D": 3.0, "FF": 50.0},
+    "mega": {"P": 0.64, "I": 0.2, "D": 0.07},
 }
 
 
@@ -123,6 +125,40 @@ def test_inav_holds_a_rate_by_its_documented_divisors() -> None:
         state, out = loop.step(state, np.array(0.1), np.array(0.05))
     demand, rate = np.rad2deg(0.1) * 20 / 6.56, np.rad2deg(0.05)
     assert float(out) == pytest.approx(((demand - rate) + 2.0 * demand) / 500.0, rel=1e-6)
+
+
+def test_the_hold_answers_late_in_angles_of_the_surface() -> None:
+    loop = mega.structure("roll", {}, 15.0).loop({"P": 0.5, "I": 0.2, "D": 0.1}, 15.0)
+    state, first = loop.step(np.zeros(4), np.array(0.3), np.array(0.0))
+    state, second = loop.step(state, np.array(9.0), np.array(0.4))
+    _, third = loop.step(state, np.array(9.0), np.array(9.0))
+    assert (float(first), float(second)) == (0.0, 0.0)
+    assert float(third) == pytest.approx(0.5 * 0.3 + 0.2 * 0.3 * 0.005 - 0.1 * 0.4)
+
+
+def test_the_hold_of_a_roll_axis_has_the_loop_that_is_written_by_hand() -> None:
+    # (P + I/s + D s) L_da / (s (s - L_p)) behind servo, hold, 10 ms and a sample 5 ms old; the
+    # rate behind its filter, the angle 5 ms late in its place.
+    law = mega.structure("roll", {}, 15.0)
+    gains = {"P": 0.4, "I": 0.13, "D": 0.06}
+    w = np.geomspace(0.3, 60.0, 100)
+    dynamics = (np.array([[-10.0]]), np.array([[150.0]]), ("p_radps",))
+    system = continuous("roll", dynamics, mega.FULL_RAD, 8.0, 42.0, 1.0)
+    seen = sampled(system, 0.01, 0.005).response(w)
+    by_angle, by_rate = law_response(law.loop(gains, 15.0), w)
+    own = -(by_angle * seen[:, 0] + by_rate * seen[:, 1])
+    s, corner, lag = 1j * w, 2 * np.pi * 42.0, 2 * np.pi * 8.0
+    filtered = corner**2 / (s**2 + math.sqrt(2.0) * corner * s + corner**2)
+    late = np.exp(-s * (0.01 + 0.005 + 0.5 * 0.005)) * lag / (s + lag)
+    angle, rate = (0.4 + 0.13 / s) * np.exp(-0.005 * s), 0.06 * s * filtered
+    by_hand = (angle + rate) * 150.0 / (s * (s + 10.0)) * late
+    np.testing.assert_allclose(own, by_hand, rtol=0.02)
+    # Its margins, by python-control from the formula.
+    found = margins(own[None], w)
+    phase = np.rad2deg(np.unwrap(np.angle(by_hand)))
+    gain, turned, *_ = control.margin((np.abs(by_hand), phase, w))
+    assert found.gain_db[0] == pytest.approx(20.0 * math.log10(gain), abs=0.1)
+    assert found.phase_deg[0] == pytest.approx(turned, abs=0.5)
 
 
 def test_the_speed_scaler_ends_where_arduplane_ends_it() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -80,13 +81,45 @@ def test_the_same_aircraft_flies_as_well_by_every_law() -> None:
     # One aircraft, three laws in three units and at three rates: what limits the crossover are
     # servo and delay, which are the same; slower filters cost some of it.
     middle = []
-    for name in AUTOPILOTS:
+    for name in ("ardupilot", "px4", "inav"):
         asked = problem(0.1, autopilot=name)
         seen = draw(asked, seed=1, count=12)
         gains = search(asked, seen, Required())
         assert gains is not None
         middle.append(float(np.median(seen.judged(gains)[0].crossover_radps)))
     assert max(middle) < 2.0 * min(middle)
+
+
+def test_the_hold_raises_the_crossover_of_the_attitude() -> None:
+    asked = problem(0.1, autopilot="mega")
+    seen = draw(asked, seed=1, count=12)
+    found = search(asked, seen, Required())
+    assert found is not None
+    # A neighbour that is stiffer in angle is as fast at most, or lacks a margin.
+    reached = float(np.min(seen.judged(found)[1].crossover_radps))
+    for role in ("P", "D"):
+        step = asked.structure.settings[role].step
+        for sign in (-4, 4):
+            other = asked.structure.completed({**found, role: found[role] + sign * step}, 0.0)
+            inner, outer = seen.judged(other)
+            lacks = Required().missing(inner) + Required().missing(outer) > 0.0
+            slow = float(np.max(seen.surface_rate_radps(other))) > 1.02  # half of 4 rad/s, 95 %
+            assert lacks or slow or float(np.min(outer.crossover_radps)) < reached
+
+
+def test_gains_of_the_hold_carry_aircraft_date_margins_and_sense() -> None:
+    asked = problem(0.1, autopilot="mega")
+    gains = asked.structure.completed({"P": 0.4, "D": 0.05}, 0.0)
+    proven = verify(asked, gains, seed=1, required=Required())
+    tuned = AxisTuning(asked, Design(gains, proven, 1), {})
+    found = Tuning(AUTOPILOTS["mega"], 'my "trainer"', (tuned,), (), "2026-11-28")
+    read = tomllib.loads(found.to_param())
+    assert (read["aircraft"], read["covariance_date"]) == ('my "trainer"', "2026-11-28")
+    assert (read["roll_angle_gain"], read["roll_rate_gain"]) == (0.4, 0.05)
+    assert read["roll_integral_gain"] == pytest.approx(0.4 / 3.0, abs=0.005)
+    assert read["aileron_sense"] == 1.0
+    assert f"{proven.worst_gain_db:.1f} dB" in read["roll_holds"]
+    assert "First flight" not in found.to_text()
 
 
 def test_an_aircraft_that_answers_the_other_way_is_unstable() -> None:
@@ -116,18 +149,24 @@ def test_parameters_go_out_and_come_back(tmp_path: Path, autopilot: str) -> None
     changes = [Change("RLL_RATE_P", 0.12, 0.08, "s"), Change("RLL_RATE_D", 0.004, None, "s")]
     write = AUTOPILOTS[autopilot].text
     new, old = tmp_path / "new.param", tmp_path / "old.param"
-    new.write_text(write(changes, ["Trainer"]), encoding="utf-8")
-    old.write_text(write(taken_back(changes, {"RLL_RATE_D": 0.0}), ["Back"]), encoding="utf-8")
+    new.write_text(write(changes, {"aircraft": "Trainer"}), encoding="utf-8")
+    old.write_text(write(taken_back(changes, {"RLL_RATE_D": 0.0}), {"back": "x"}), encoding="utf-8")
     assert read_parameters(new) == {"RLL_RATE_P": 0.12, "RLL_RATE_D": 0.004}
     assert read_parameters(old) == {"RLL_RATE_P": 0.08, "RLL_RATE_D": 0.0}
 
 
 def test_files_of_ground_stations_have_their_own_lines() -> None:
     one = [Change("FW_RR_P", 0.07, 0.05, "")]
-    assert "RR_P,0.07  # before: 0.05" in AUTOPILOTS["ardupilot"].text(one, ["a"])
-    assert AUTOPILOTS["px4"].text(one, ["a"]).splitlines()[-1] == "1\t1\tFW_RR_P\t0.07\t9"
-    cli = AUTOPILOTS["inav"].text([Change("fw_p_roll", 9, 5, "")], ["a"])
-    assert cli.splitlines() == ["# a", "# fw_p_roll before: 5", "set fw_p_roll = 9", "save"]
+    heading = {"aircraft": "a"}
+    assert "RR_P,0.07  # before: 0.05" in AUTOPILOTS["ardupilot"].text(one, heading)
+    assert AUTOPILOTS["px4"].text(one, heading).splitlines()[-1] == "1\t1\tFW_RR_P\t0.07\t9"
+    cli = AUTOPILOTS["inav"].text([Change("fw_p_roll", 9, 5, "")], heading)
+    assert cli.splitlines() == [
+        "# aircraft: a",
+        "# fw_p_roll before: 5",
+        "set fw_p_roll = 9",
+        "save",
+    ]
 
 
 def test_a_file_without_parameters_is_refused(tmp_path: Path) -> None:

@@ -138,7 +138,8 @@ def _worth(seen: Scenarios, gains: Mapping[str, float], asked: Required) -> floa
     over = float(np.max(seen.surface_rate_radps(gains))) / limit - 1.0
     if over > 0.0:
         return -over
-    return float(np.min(inner.crossover_radps)) if seen.stable(gains).all() else -1e3
+    wanted = {"actuator": inner, "attitude": outer}[seen.problem.structure.fastest]
+    return float(np.min(wanted.crossover_radps)) if seen.stable(gains).all() else -1e3
 
 
 def feed_forward(problem: Problem) -> float:

@@ -2,11 +2,13 @@
 
 Mission Planner: ``NAME,VALUE``, what follows a # is a comment (ExtLibs/Utilities/ParamFile.cs).
 QGroundControl: vehicle, component, name, value and type between tabs (developer guide, parameter
-file). INAV: lines of its command line, ``set name = value`` (docs/Cli.md).
+file). INAV: lines of its command line, ``set name = value`` (docs/Cli.md). The
+logger: TOML, whose heading is keys; elsewhere it is comments.
 """
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -24,7 +26,7 @@ LINES = tuple(
     for pattern in (
         rf"{NAMED}[,\s]+(\S+)",
         rf"\d+\t\d+\t{NAMED}\t(\S+)\t\d+",
-        rf"set {NAMED} = (\S+)",
+        rf"(?:set )?{NAMED} = (\S+)",
     )
 )
 
@@ -44,7 +46,8 @@ class Change:
         return f"before: {'not known' if self.old is None else f'{self.old:g}'}"
 
 
-Writer = Callable[[Iterable[Change], Iterable[str]], str]
+Heading = Mapping[str, str | float]
+Writer = Callable[[Iterable[Change], Heading], str]
 
 
 def read_parameters(path: Path) -> dict[str, float]:
@@ -78,29 +81,41 @@ def read_parameters(path: Path) -> dict[str, float]:
     return found
 
 
-def mission_planner_text(changes: Iterable[Change], heading: Iterable[str]) -> str:
+def _comments(heading: Heading) -> list[str]:
+    return [f"# {key}: {value}" for key, value in heading.items()]
+
+
+def mission_planner_text(changes: Iterable[Change], heading: Heading) -> str:
     """Return new values as Mission Planner loads them, the old one beside each."""
-    lines = [f"# {line}" for line in heading]
+    lines = _comments(heading)
     lines += [f"{one.name},{one.new:g}  # {one.before}" for one in changes]
     return "\n".join(lines) + "\n"
 
 
-def qgroundcontrol_text(changes: Iterable[Change], heading: Iterable[str]) -> str:
+def qgroundcontrol_text(changes: Iterable[Change], heading: Heading) -> str:
     """Return new values as QGroundControl loads them, the old ones in comments above."""
     changes = tuple(changes)
-    lines = [f"# {line}" for line in heading]
+    lines = _comments(heading)
     lines += [f"# {one.name} {one.before}" for one in changes]
     lines += [f"1\t1\t{one.name}\t{one.new:g}\t{FLOAT}" for one in changes]
     return "\n".join(lines) + "\n"
 
 
-def cli_text(changes: Iterable[Change], heading: Iterable[str]) -> str:
+def cli_text(changes: Iterable[Change], heading: Heading) -> str:
     """Return new values as lines for INAV's command line; gains are of the active profile."""
     changes = tuple(changes)
-    lines = [f"# {line}" for line in heading]
+    lines = _comments(heading)
     for one in changes:
         lines += [f"# {one.name} {one.before}", f"set {one.name} = {one.new:g}"]
     return "\n".join([*lines, *(["save"] if changes else [])]) + "\n"
+
+
+def toml_text(changes: Iterable[Change], heading: Heading) -> str:
+    """Return gains of the logger's hold with their units, what they were made of in keys above."""
+    # A string in JSON's quotes and escapes is one of TOML's.
+    lines = [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in heading.items()]
+    lines += [f"{one.name} = {float(one.new)!r}  # {one.unit}" for one in changes]
+    return "\n".join(lines) + "\n"
 
 
 def taken_back(changes: Iterable[Change], defaults: Mapping[str, float]) -> tuple[Change, ...]:

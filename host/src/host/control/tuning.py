@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,7 @@ from host.control.parameter_file import Change, taken_back
 from host.control.plant import RATES
 from host.control.scenarios import Problem
 from host.control.uncertain_axis import UncertainAxis, axes_of, axes_of_models
+from host.control.verification import UNSEEN
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -65,6 +67,8 @@ class Tuning:
     autopilot : Autopilot
     aircraft : str
     axes : tuple of AxisTuning
+    dated : str
+        Day of the covariance that the gains hold over.
     notes : tuple of str
         What was not known, and what was taken in its place.
     """
@@ -73,6 +77,7 @@ class Tuning:
     aircraft: str
     axes: tuple[AxisTuning, ...]
     notes: tuple[str, ...]
+    dated: str = ""
 
     @property
     def gains(self) -> dict[str, float]:
@@ -95,8 +100,24 @@ class Tuning:
 
     def to_param(self) -> str:
         """Return the changed parameters as the file that the ground station loads."""
-        heading = [f"{self.aircraft}: gains of host tune; try half of them first"]
-        return self.autopilot.text(self.changes, heading)
+        heading = {"aircraft": self.aircraft, "covariance_date": self.dated}
+        return self.autopilot.text(self.changes, {**heading, **dict(self._proven())})
+
+    def _proven(self) -> Iterator[tuple[str, str | float]]:
+        """Return what the heading of a file says of each axis with gains."""
+        yield "first_flight", "half of the gains"
+        for one in self.axes:
+            if one.design.gains is None:
+                continue
+            speeds = ", ".join(f"{v:.1f}" for v in one.problem.airspeeds_mps)
+            found = one.design.verification
+            yield (
+                f"{one.axis}_holds",
+                f"{found.worst_gain_db:.1f} dB, {found.worst_phase_deg:.0f} deg at least in"
+                f" {UNSEEN} aircraft at {speeds} m/s",
+            )
+            # Gains are positive; this turns them into the aircraft file's sign of the surface.
+            yield f"{one.problem.actuator.surface}_sense", one.problem.axis.sense
 
     def to_restore(self) -> str:
         """Return the file that takes them back."""
@@ -105,9 +126,11 @@ class Tuning:
             for one in self.axes
             for setting in one.problem.structure.settings.values()
         }
-        heading = [f"{self.aircraft}: back to the values before host tune"]
+        heading: dict[str, str | float] = {
+            "aircraft": self.aircraft, "back_to": "the values before host tune"
+        }  # fmt: skip
         if any(one.old is None for one in self.changes):
-            heading.append("nobody named the old values: these are the autopilot's defaults")
+            heading["default"] = "nobody named the old values: these are the autopilot's own"
         return self.autopilot.text(taken_back(self.changes, defaults), heading)
 
     def document(self) -> dict[str, Any]:
@@ -115,6 +138,7 @@ class Tuning:
         return {
             "autopilot": self.autopilot.name,
             "aircraft": self.aircraft,
+            "covariance_date": self.dated,
             "gains": self.gains,
             "changes": [
                 {"name": c.name, "new": c.new, "old": c.old, "unit": c.unit} for c in self.changes
@@ -175,7 +199,7 @@ def tune(
     aircraft : str
         Name or file: travel of the surfaces, servo, span, speed range.
     autopilot : str
-        ``ardupilot``, ``px4`` or ``inav``.
+        ``ardupilot``, ``px4``, ``inav``, or ``mega``, the logger's hold.
     parameters : mapping of str to float, optional
         Of the autopilot, as a log or a parameter file has them; its defaults without.
     airspeeds_mps : sequence of float
@@ -194,9 +218,12 @@ def tune(
         raise ControlError(f"autopilot '{autopilot}', expected {', '.join(AUTOPILOTS)}")
     chosen = AUTOPILOTS[autopilot]
     if isinstance(source, Sequence):
-        axes, noise = axes_of_models([Path(one) for one in source]), dict[str, float]()
+        paths = [Path(one) for one in source]
+        axes, noise = axes_of_models(paths), dict[str, float]()
+        # The oldest: a model's file is as old as its answer.
+        dated = date.fromtimestamp(min(path.stat().st_mtime for path in paths))
     else:
-        axes = axes_of(source)
+        axes, dated = axes_of(source), date.today()
         noise = {name: _noise(source, name) for name in axes}
     loaded = load_measured(aircraft)
     logged = dict(parameters or {})
@@ -205,7 +232,7 @@ def tune(
         speeds = tuple(airspeeds_mps) or _speeds(loaded.scalars, axis)
         problem = Problem(
             axis,
-            actuator_of(aircraft, name),
+            actuator_of(aircraft, name, chosen.travel_rad),
             chosen.structure(name, logged, axis.trim.airspeed_mps),
             speeds,
             loaded.scalars.get("geometry.span_m", 0.0),
@@ -215,7 +242,8 @@ def tune(
         costs = bandwidth_costs(problem, best.gains) if best.gains else []
         found.append(AxisTuning(problem, best, logged, tuple(costs)))
     flown = () if isinstance(source, Sequence) else _airspeeds_mps(source)
-    return Tuning(chosen, loaded.title, tuple(found), tuple(_notes(found, logged, flown)))
+    notes = tuple(_notes(found, chosen, logged, flown))
+    return Tuning(chosen, loaded.name, tuple(found), notes, dated.isoformat())
 
 
 def _speeds(scalars: Mapping[str, float], axis: UncertainAxis) -> tuple[float, ...]:
@@ -245,7 +273,10 @@ def _airspeeds_mps(identified: Identification) -> tuple[float, ...]:
 
 
 def _notes(
-    axes: Sequence[AxisTuning], logged: Mapping[str, float], flown_mps: Sequence[float]
+    axes: Sequence[AxisTuning],
+    chosen: Autopilot,
+    logged: Mapping[str, float],
+    flown_mps: Sequence[float],
 ) -> Iterator[str]:
     for missing in {"roll", "pitch"} - {one.axis for one in axes}:
         yield f"no gains for {missing}: the answer has no model of it"
@@ -253,7 +284,7 @@ def _notes(
         yield "a saved model has no correlations: its derivatives are drawn independently"
     settings = [s for one in axes for s in one.problem.structure.settings.values()]
     own = [s for s in settings if s.name in logged]
-    if not own:
+    if not own and chosen.words:
         yield (
             "filters, loop rate and speeds are the autopilot's defaults: name its parameters with"
             " --parameters, or a log that has them"

@@ -30,9 +30,13 @@ def tuning_lines(found: Tuning) -> Iterator[str]:
     for axis in found.axes:
         yield ""
         yield from _axis_lines(axis)
-    if found.changes:
-        yield ""
+    if not found.changes:
+        return
+    yield ""
+    if found.autopilot.words:
         yield from (line.format(**found.autopilot.words) for line in FIRST_FLIGHT)
+    else:
+        yield "No firmware flies these gains yet: they are for a card's hold of wings and pitch."
 
 
 def _axis_lines(one: AxisTuning) -> Iterator[str]:
@@ -55,7 +59,7 @@ def _axis_lines(one: AxisTuning) -> Iterator[str]:
         old = "as before"
         if change is not None:
             old = f"before: {'not known' if change.old is None else f'{change.old:g}'}"
-        yield f"  {setting.name:18s} {value:8.4g} {setting.unit:13s} {old}"
+        yield f"  {setting.name:20s} {value:8.4g} {setting.unit:13s} {old}"
     for name, loop in (("at the surface", proven.actuator), ("attitude", proven.attitude)):
         yield (
             f"  {name + ' loop:':22s} at least {loop.gain_db.min():.1f} dB,"

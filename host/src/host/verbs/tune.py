@@ -23,7 +23,8 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--aircraft", required=True, metavar="NAME",
                         help="aircraft file: travel of surfaces, servo, span, speeds")  # fmt: skip
     parser.add_argument("--for", dest="autopilot", default="ardupilot", metavar="NAME",
-                        help="autopilot: ardupilot, px4 or inav")  # fmt: skip
+                        help="autopilot: ardupilot, px4, inav, or mega, the hold of the"
+                        " logger")  # fmt: skip
     parser.add_argument("--parameters", type=Path, metavar="FILE",
                         help="the autopilot's parameters as the ground station saves them; a log"
                         " of it has its own")  # fmt: skip
@@ -77,10 +78,13 @@ def run(args: argparse.Namespace) -> int:
     print(json.dumps(found.document(), indent=2) if args.json else found.to_text())
     if args.save is not None:
         before = args.save.with_name(f"{args.save.stem}-before{args.save.suffix}")
-        for place, text in ((args.save, found.to_param()), (before, found.to_restore())):
+        texts = {args.save: found.to_param()}
+        if found.autopilot.words:
+            texts[before] = found.to_restore()
+        for place, text in texts.items():
             with atomic_write(place) as unfinished:
                 unfinished.write_text(text, encoding="utf-8")
-        print(f"wrote {args.save}, {before}", file=sys.stderr)
+        print(f"wrote {', '.join(map(str, texts))}", file=sys.stderr)
     if args.plots is not None:
         for axis, figure in found.plot().items():
             with atomic_write(args.plots / f"tune_{axis}.svg") as unfinished:

@@ -84,6 +84,7 @@ class ArduPlane:
     trim_mps: float
     share: float = 1.0
     searched: ClassVar[tuple[str, ...]] = ("P", "D", "TC")
+    fastest: ClassVar[str] = "actuator"
 
     def completed(self, chosen: Mapping[str, float], feed_forward: float) -> dict[str, float]:
         """Return every gain: FF undoes the aircraft at its trim, I is as AUTOTUNE sets it.

@@ -91,6 +91,7 @@ class Inav:
     axis: str
     fixed: Mapping[str, float]
     searched: ClassVar[tuple[str, ...]] = ("P", "D")
+    fastest: ClassVar[str] = "actuator"
 
     @property
     def settings(self) -> Mapping[str, Setting]:

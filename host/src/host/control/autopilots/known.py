@@ -5,9 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from host.control.autopilots import ardupilot, inav, parameter_table, px4
+from host.control.autopilots import ardupilot, inav, mega, parameter_table, px4
 from host.control.autopilots.structure import Structure
-from host.control.parameter_file import Writer, cli_text, mission_planner_text, qgroundcontrol_text
+from host.control.parameter_file import (
+    Writer,
+    cli_text,
+    mission_planner_text,
+    qgroundcontrol_text,
+    toml_text,
+)
 
 
 @dataclass(frozen=True)
@@ -21,15 +27,18 @@ class Autopilot:
         From an axis, parameters by name and the airspeed of the model.
     text : callable
         From changes and a heading to the file that its ground station loads.
+    travel_rad : float or None
+        Angle of the surface at full output; None where that is the aircraft file's limit.
     """
 
     name: str
     structure: Callable[[str, Mapping[str, float], float], Structure]
     text: Writer
+    travel_rad: float | None = None
 
     @property
     def words(self) -> Mapping[str, str]:
-        """What the first flight's page calls its modes and gains."""
+        """What the first flight's page calls its modes and gains; none where none flies yet."""
         return parameter_table.words(self.name)
 
 
@@ -39,5 +48,6 @@ AUTOPILOTS = {
         Autopilot("ardupilot", ardupilot.structure, mission_planner_text),
         Autopilot("px4", px4.structure, qgroundcontrol_text),
         Autopilot("inav", inav.structure, cli_text),
+        Autopilot("mega", mega.structure, toml_text, mega.FULL_RAD),
     )
 }

@@ -87,6 +87,7 @@ class Px4:
     share: float
     trim_mps: float
     searched: ClassVar[tuple[str, ...]] = ("P", "D", "TC")
+    fastest: ClassVar[str] = "actuator"
 
     @property
     def settings(self) -> Mapping[str, Setting]:

@@ -74,6 +74,10 @@ class Structure(Protocol):
     def searched(self) -> tuple[str, ...]:
         """Roles that a search may choose; the others follow from these."""
 
+    @property
+    def fastest(self) -> str:
+        """Loop whose crossover a search raises: ``actuator`` or ``attitude``."""
+
     def completed(self, chosen: Mapping[str, float], feed_forward: float) -> dict[str, float]:
         """Return every gain on its own steps.
 
