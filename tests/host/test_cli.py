@@ -102,6 +102,17 @@ def test_wrong_arguments_end_in_2(
     assert err.count("\n") == 1
 
 
+@pytest.mark.parametrize("verb", ["info", "decode", "maneuvers", "identify", "plot", "report"])
+def test_a_missing_file_is_told_before_numpy_is_loaded(verb: str) -> None:
+    text = (
+        f"import sys; from host.cli import main; code = main([{verb!r}, 'nowhere.bin'])\n"
+        "sys.exit(100 if 'numpy' in sys.modules else code)"
+    )
+    ended = subprocess.run([sys.executable, "-c", text], env=ENVIRONMENT, capture_output=True)
+    assert ended.returncode == 2
+    assert ended.stderr.decode().splitlines() == ["host: nowhere.bin: no such file or folder"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "code"),
     [

@@ -17,8 +17,9 @@ from types import FrameType, ModuleType
 from typing import TextIO
 
 from host.errors import ExitCode, HostError, UsageError
+from host.files.regular import file_or_folder
 from host.near_names import like
-from host.placed_arguments import PlacedParser
+from host.placed_arguments import READS, PlacedParser
 from host.progress import watched
 from host.terminal import cleaned_streams
 
@@ -197,8 +198,20 @@ def _run(arguments: list[str]) -> int:
     if not modules:
         parser.print_help()
         return int(ExitCode.USAGE)
+    _look_for_files(parsed)
     with watched(chosen or "", shown=chosen not in _OWN_DISPLAY):
         return int(modules[0].run(parsed))
+
+
+def _look_for_files(parsed: argparse.Namespace) -> None:
+    """Refuse a file that is not there before a verb loads what it works with.
+
+    What has no ending may be the name of something shipped: the verb knows.
+    """
+    named = getattr(parsed, "source", None) if getattr(parsed, READS, False) else None
+    for path in named if isinstance(named, list) else [named]:
+        if isinstance(path, Path) and path.suffix:
+            file_or_folder(path)
 
 
 def command_parser(loaded: Sequence[str]) -> tuple[argparse.ArgumentParser, list[ModuleType]]:

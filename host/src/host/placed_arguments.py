@@ -18,6 +18,7 @@ from host.near_names import like
 T = TypeVar("T")
 Placed = Sequence[tuple[int, T]]  # a value, and how many files stood before it
 _FILE = "--source"
+READS = "reads"  # true of a verb whose `source` is files
 
 
 class PlacedParser(argparse.ArgumentParser):
@@ -51,6 +52,7 @@ class PlacedParser(argparse.ArgumentParser):
 
     def add_files(self, about: str) -> None:
         """Add files as `source`, to which arguments of action `StorePlaced` belong."""
+        self.set_defaults(**{READS: True})
         self.add_argument("_files", metavar="source", nargs="*", help=about)
         self.add_argument(_FILE, dest="source", type=Path, action="append", default=[],
                           help=argparse.SUPPRESS)  # fmt: skip

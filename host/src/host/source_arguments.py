@@ -8,11 +8,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from host.placed_arguments import READS
+
 OUTPUT_OF_AUTOPILOT = re.compile(r"\d+=[-A-Za-z]*")
 
 
 def add_log_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the one SOURCE of a verb that decodes, and what chooses within it."""
+    parser.set_defaults(**{READS: True})
     parser.add_argument(
         "source",
         type=Path,

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from host.cli import main
 from host.link.serial import DeviceError, SerialPort
-from host.live import live_sources
+from host.live import live_program, live_request, live_sources
 from host.live.live_session import LiveSession
 from host.live.live_sources import PortSource, UdpSource, choose_radio
 from host.live.live_stream import LiveStream
@@ -124,6 +124,17 @@ def test_what_goes_wrong_is_one_line(
     assert says in err
     assert "Traceback" not in err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["flight.radio", "noise.radio"]
+
+
+def test_a_missing_extra_of_the_page_is_told_before_any_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(live_request, "find_spec", lambda name: None)
+    monkeypatch.setattr(live_program, "open_source", lambda *_: pytest.fail("a flight was flown"))
+    assert main(["live", "sim:demo"]) == 2
+    assert "the page needs aiohttp" in one_line(capsys)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_busy_port_is_one_line(

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from host.errors import HostError, UsageError
-from host.extras import install_hint
 from host.live.estimates.live_estimates import LiveEstimates, live_estimates
 from host.live.ground_capture import GroundCapture, new_capture_path, utc_now
 from host.live.json_lines import JsonLines
@@ -316,16 +315,12 @@ async def _page(
     watch: RecordingWatch,
     tell: Callable[[str], None],
 ) -> web.AppRunner:
-    try:
-        from aiohttp import web
+    from aiohttp import web
 
-        from host.live.page_guard import PageGuard
-        from host.live.page_server import PageServer
-        from host.live.request_noise import quieten
-    except ImportError as error:
-        raise UsageError(
-            f"the page needs {error.name}: {install_hint(error.name)}; or --no-page"
-        ) from None
+    from host.live.page_guard import PageGuard
+    from host.live.page_server import PageServer
+    from host.live.request_noise import quieten
+
     listener = listening_socket(request.port, lan=request.lan)
     port = listener.getsockname()[1]
     guard = PageGuard(port, tuple(own_addresses()) if request.lan else ())

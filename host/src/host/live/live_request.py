@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from host.aircraft.file import load_measured
+from host.chart_library import chart_script
 from host.errors import UsageError
 from host.extras import install_hint
 from host.live.live_session import LiveSession
@@ -80,8 +82,18 @@ def open_source(request: LiveRequest, tell: Callable[[str], None]) -> Source:
     return port_source(text, request.baud, tell)
 
 
+def _page_extras() -> None:
+    """Refuse a page whose libraries are missing."""
+    for library in ("aiohttp", "simplekml"):
+        if find_spec(library) is None:
+            raise UsageError(f"the page needs {library}: {install_hint(library)}; or --no-page")
+    chart_script()
+
+
 def check_request(request: LiveRequest) -> None:
-    """Refuse a wrong argument before a device is opened and a file is made."""
+    """Refuse a wrong argument or a missing extra before a device is opened and a file is made."""
+    if request.page:
+        _page_extras()
     for option, number, most in (
         ("--port", request.port, MOST_PORT), ("--baud", request.baud, MOST_BAUD),
     ):  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Self
 
@@ -17,6 +17,8 @@ from host.twin.recorder.sitl_radio import radio
 from host.twin.recorder.stimuli import Stimuli, stimuli
 from host.twin.sensors.local_flow import air_data
 from host.twin.testcard import cards
+
+_A_WAIT_S = 30.0  # what is said of a flight that takes longer
 
 
 @dataclass(slots=True)
@@ -57,13 +59,13 @@ class SimulatedSource:
         """
         card = cards.load(self.card)
         recorder_library()
-        tell(f"flying {self.card} (a few seconds)")
+        tell(f"flying {self.card}")
         if self.flight_card:
             record, given, _ = logger_flight(
                 self.flight_card, card, seed=self.seed, recorder=self._recorded
             )
         else:
-            record = fly(card, seed=self.seed)
+            record = fly(card, seed=self.seed, progress=_time_left(tell))
             given = stimuli(record, air_data(record))
         self.calibration_text = calibration(record.aircraft, record.draws.errors)
         self.aircraft = record.aircraft.name
@@ -94,3 +96,17 @@ class SimulatedSource:
             yield from silence(start_s + sent.t_s)
             yield sent.data
         tell(f"the flight of {self.card} is over")
+
+
+def _time_left(tell: Tell) -> Callable[[float], None]:
+    """Return what says once, after the first part of a flight, how long the rest takes."""
+    began_s, said = time.monotonic(), False
+
+    def progress(share: float) -> None:
+        nonlocal said
+        left_s = (time.monotonic() - began_s) * (1.0 - share) / share
+        if not said and left_s > _A_WAIT_S:
+            tell(f"{left_s / 60.0:.0f} minutes of work left; Ctrl-C ends")
+        said = True
+
+    return progress

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from host.decode.newest_flight import source_or_newest
+from host.placed_arguments import READS
 from host.source_arguments import add_flight, add_output, add_sensor
 
 
@@ -20,6 +21,7 @@ def add_parser(subparsers: Any) -> None:
         description="Say what a log is, at once: only the first 256 KiB are read. Of a log of PX4"
         " or ArduPilot all is read: what can be identified, and which setting to change.",
     )
+    parser.set_defaults(**{READS: True})
     parser.add_argument(
         "source",
         type=Path,

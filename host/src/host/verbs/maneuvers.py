@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from host.decode.newest_flight import source_or_newest
+from host.placed_arguments import READS
 from host.source_arguments import add_flight, add_output, add_row_rate, add_sensor
 
 
@@ -19,6 +20,7 @@ def add_parser(subparsers: Any) -> None:
         description="Find the maneuvers of a flight from its control inputs, name and grade them:"
         " amplitude, trim before, noise, pilot feedback.",
     )
+    parser.set_defaults(**{READS: True})
     parser.add_argument("source", type=Path, nargs="?",
                         help="log (also of PX4, ArduPilot), original rows, CSV, Parquet or MAT"
                         " file; without it the newest flight of the working folder")  # fmt: skip
