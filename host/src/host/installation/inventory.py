@@ -114,6 +114,8 @@ def _libraries() -> list[Library]:
     for one in wanted:
         name = re.split(r"[^\w.-]", one)[0]
         extra = re.search(r"extra == ['\"]([\w-]+)", one)
+        if extra and extra[1] == "all":  # it repeats the others
+            continue
         version = _version(name)
         hint = "" if version else install_hint(name)
         found.append(Library(name, extra[1] if extra else "", version, hint))
