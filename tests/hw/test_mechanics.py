@@ -91,7 +91,7 @@ def test_room_is_left_around_mega_and_shield() -> None:
     left = dict(re.findall(r"^left (.+),(\S+)$", STACK, re.M))
     assert set(left) >= {"below the lid", "left", "right", "front", "back", "under the Mega"}
     assert min(map(float, left.values())) >= 1.0
-    page = (MECHANICS.parent / "build.md").read_text(encoding="utf-8")
+    page = " ".join((MECHANICS.parent / "build.md").read_text(encoding="utf-8").split())
     assert f"{float(left['left']):.2f} mm from USB shell to wall" in page
     assert f"{float(left['below the lid']):.1f} mm below the lid" in page
 

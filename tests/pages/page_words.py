@@ -94,10 +94,11 @@ def count_pages(root: Path = ROOT) -> list[PageCount]:
 
 
 def totals(counts: list[PageCount]) -> dict[str, int]:
-    """Sum words by group, all hand-written ones, long lines and full cells."""
-    found = {name: 0 for name, _ in GROUPS}
+    """Sum words by group but `apart`, all hand-written ones, long lines and full cells."""
+    found = {name: 0 for name, _ in GROUPS if name != "apart"}
     for count in counts:
-        found[count.group] += count.words
+        if count.group in found:
+            found[count.group] += count.words
     found["hand-written"] = sum(c.words for c in counts if c.group not in NOT_WRITTEN_BY_HAND)
     found["long lines"] = sum(len(c.long_lines) for c in counts)
     found["full cells"] = sum(len(c.full_cells) for c in counts)

@@ -15,7 +15,7 @@ CITED = re.compile(r"eq\.\s+(?:#\s+)?(\d+)")
 
 def on_the_page(text: str) -> set[tuple[int, str]]:
     """Numbers and the files that the page says compute them."""
-    lines = [(NUMBERED.match(line), line) for line in text.split("\n")]
+    lines = [(NUMBERED.match(part), part) for part in text.split("\n\n")]
     return {(int(m.group(1)), file) for m, line in lines if m for file in LINK.findall(line)}
 
 

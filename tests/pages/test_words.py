@@ -47,4 +47,4 @@ def test_signs_of_a_table_are_no_words() -> None:
 def test_limits_only_fall(tmp_path: Path) -> None:
     file = tmp_path / "limits.toml"
     write_limits({"a": 5, "b": 9}, {"a": 7, "b": 8}, file)
-    assert read_limits(file) == {"a": 5, "b": 8}
+    assert read_limits(file) == {"a": 5, "b": 8, "generated": 16_000}
