@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import subprocess
+import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from host.log import FlightLog, read_log
+from host.readers.even_grid import even_columns
+from host.sysid.maneuvers import detect_maneuvers
 from host.twin.faults import FOREVER_S, Fault
 from host.twin.flight.fly import FlightRecord, fly
-from host.twin.outcome import compare, virtual_calibration
+from host.twin.outcome import compare, truth_files, virtual_calibration
 from host.twin.recorder import sitl
 from host.twin.recorder.fat32 import SECTOR, CardImageError, CardReader, format_card
 from host.twin.recorder.stimuli import SAMPLE_STEP_TICKS, Stimuli, stimuli
@@ -60,6 +63,20 @@ def test_nothing_is_lost_and_the_log_is_whole(flown: Flown) -> None:
     recorded_s = flown.given.duration / TICKS_PER_S - sitl.PRESS_S
     assert len(ident) == pytest.approx(recorded_s * 100.0, rel=0.01)
     assert flown.recording.lost_edges == 0
+
+
+def test_truth_counts_from_the_logs_first_row(flown: Flown, tmp_path: Path) -> None:
+    """Maneuvers of the truth file begin where those found in the log do."""
+    table = flown.log.table()
+    began_us = int(flown.log.frames["ident"]["t_us"][0])
+    first_s = float(compare.true_times(flown.record, table, began_us)[0])
+    truth_files.write(flown.record, flown.data, tmp_path / "flight", first_row_s=first_s)
+    truth = tomllib.loads((tmp_path / "flight.truth.toml").read_text(encoding="utf-8"))
+    columns, _ = even_columns(table)
+    for found, true in zip(detect_maneuvers(columns), truth["maneuver"], strict=True):
+        assert found.start_s == pytest.approx(true["start_s"], abs=0.15)
+    with np.load(tmp_path / "flight.truth.npz") as series:
+        assert series["t_s"][0] == truth["power_on_s"] == pytest.approx(-first_s)
 
 
 def test_every_imu_sample_is_logged_bit_by_bit_with_its_age(flown: Flown) -> None:

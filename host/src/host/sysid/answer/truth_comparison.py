@@ -83,7 +83,7 @@ def as_flown(document: dict[str, Any], answer: Answer) -> dict[str, Any]:
     Derivatives go with the square of the airspeed, so those of a trim, or of a maneuver that was
     held out, are others. Without times of the log's first row (several flights) all stay.
     """
-    first = document.get("first_row_s")
+    first = 0.0 if "power_on_s" in document else document.get("first_row_s")  # an older file
     if first is None:
         return document
     spans = [(m.start_s + first, m.end_s + first) for m in answer.used]

@@ -192,15 +192,18 @@ def simulate(
         progress("picture", 0.0)
         image = folder / "flight.png"
         try:
+            zero_s = outcome.first_row_s
+            true = truth_files.series(record, data)
             picture.draw(
-                outcome.table,
+                _counted_from(zero_s, outcome.table),
                 image,
                 title=f"{card.title} (simulated, seed {seed})",
-                windows=truth_files.maneuvers(record, data),
-                faults=card.faults,
-                truth=truth_files.series(record, data),
-                second=second,
+                windows=truth_files.counted_from(zero_s, truth_files.maneuvers(record, data)),
+                faults=[replace(fault, at_s=fault.at_s - zero_s) for fault in card.faults],
+                truth=true | {"t_s": true["t_s"] - zero_s},
+                second=None if second is None else _counted_from(zero_s, second),
                 second_name="thesis logger",
+                power_on_s=-zero_s,
             )
             outcome.files.append(image)
         except ImportError as error:  # a missing picture must not cost the flight
@@ -257,6 +260,10 @@ def _decoded(outcome: Outcome, path: Path, folder: Path, chip: Imu | None) -> pd
     outcome.deviations = compare.deviations(outcome.record, table, table["t_s"])
     outcome.first_row_s = float(table["t_s"].iloc[0])
     return table
+
+
+def _counted_from(first_row_s: float, table: pd.DataFrame) -> pd.DataFrame:
+    return table.assign(t_s=table["t_s"] - first_row_s)
 
 
 def _csv(table: pd.DataFrame, path: Path) -> list[Path]:

@@ -51,6 +51,7 @@ def draw(
     truth: Mapping[str, Array] | None = None,
     second: pd.DataFrame | None = None,
     second_name: str = "",
+    power_on_s: float = 0.0,
 ) -> None:
     """Draw a flight to an image file.
 
@@ -69,6 +70,8 @@ def draw(
         True columns (grey, behind), with ``t_s``.
     second : DataFrame, optional
         The same flight as another logger saw it (black steps), named `second_name`.
+    power_on_s : float
+        On the table's time.
 
     Raises
     ------
@@ -143,6 +146,6 @@ def draw(
             color=FAULT_COLOUR, bbox={"fc": "white", "alpha": 0.7, "lw": 0, "pad": 0.5},
         )  # fmt: skip
     figure.suptitle(title, fontsize=11)
-    np.atleast_1d(axes)[-1].set_xlabel("time since power-on, s")
+    np.atleast_1d(axes)[-1].set_xlabel(f"time, s; power-on at {power_on_s:.2f}")
     figure.savefig(path, dpi=110)
     pyplot.close(figure)

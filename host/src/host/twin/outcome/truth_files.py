@@ -6,6 +6,7 @@ per maneuver.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from host.twin.flight.pilot import Window
 from host.twin.sensors.local_flow import AirData
 from host.twin.sensors.sensor_delays import dlpf_for, sensor_delays
 
+_TIMES = ("start_s", "input_end_s", "end_s", "pilot_corrects_from_s")
 STRIDE = 5  # samples of 1 ms per row of the truth file: 200 Hz
 
 
@@ -150,7 +152,10 @@ def _modes(
 
 
 def summary(record: FlightRecord, data: AirData, first_row_s: float = 0.0) -> dict[str, object]:
-    """Return everything of the truth that is not a time series, ready for TOML."""
+    """Return everything of the truth that is not a time series, ready for TOML.
+
+    Times count from the log's first row, as those of `host maneuvers` and `host identify`.
+    """
     frame, card = record.frame, record.card
     return {
         "format": 1,
@@ -160,9 +165,9 @@ def summary(record: FlightRecord, data: AirData, first_row_s: float = 0.0) -> di
         "aircraft": record.aircraft.name,
         "seed": record.seed,
         "duration_s": float(record.t_s[-1]) if len(record.t_s) else 0.0,
-        "launch_s": card.flight.ground_s,
+        "launch_s": card.flight.ground_s - first_row_s,
         "ended_on_ground": record.touched_ground,
-        "first_row_s": first_row_s,
+        "power_on_s": -first_row_s,
         "rate_hz": card.flight.rate_hz,
         "turbulence_mps": card.air.turbulence_mps,
         "flown": {
@@ -186,15 +191,25 @@ def summary(record: FlightRecord, data: AirData, first_row_s: float = 0.0) -> di
         "fault": [
             {
                 "kind": f.kind,
-                "at_s": f.at_s,
+                "at_s": f.at_s - first_row_s,
                 "duration_s": f.duration_s,
                 "value": f.amount,
                 "channel": f.channel,
             }
             for f in card.faults
         ],
-        "maneuver": maneuvers(record, data),
+        "maneuver": counted_from(first_row_s, maneuvers(record, data)),
     }
+
+
+def counted_from(
+    first_row_s: float, windows: Sequence[Mapping[str, object]]
+) -> list[dict[str, object]]:
+    """Return maneuvers with times that count from the log's first row in place of power-on."""
+    return [
+        {**w, **{name: float(str(w[name])) - first_row_s for name in _TIMES if name in w}}
+        for w in windows
+    ]
 
 
 def write(
@@ -208,8 +223,7 @@ def write(
     data : AirData
     stem : Path
     first_row_s : float
-        True time since power-on of the log's first row. Subtracted from a time here it gives the
-        table's `t_s`.
+        True time since power-on of the log's first row; times in both files count from it.
 
     Raises
     ------
@@ -220,7 +234,9 @@ def write(
         stem.with_name(stem.name + ".truth.npz"),
         stem.with_name(stem.name + ".truth.toml"),
     )
-    np.savez(arrays, allow_pickle=False, **series(record, data))
+    columns = series(record, data)
+    columns["t_s"] = columns["t_s"] - first_row_s
+    np.savez(arrays, allow_pickle=False, **columns)
     document = {
         key: value for key, value in summary(record, data, first_row_s).items() if value != []
     }
