@@ -11,15 +11,19 @@ import pytest
 from host.arrays import Array
 from host.control import ControlError, read_parameters
 from host.control.actuator import Actuator, actuator_of
+from host.control.autopilots import ardupilot_yaw
 from host.control.autopilots.known import AUTOPILOTS
+from host.control.axis_tuning import AxisTuning, YawTuning
 from host.control.bandwidth_costs import bandwidth_costs, known
 from host.control.disturbances import gyro_noise_radps
+from host.control.lateral_pair import PairProblem
 from host.control.loop_design import Design, design, feed_forward, search
 from host.control.parameter_file import Change, taken_back
 from host.control.scenarios import Problem, draw
-from host.control.tuning import AxisTuning, Tuning
+from host.control.tuning import Tuning
 from host.control.uncertain_axis import UncertainAxis
 from host.control.verification import Required, verify
+from host.control.yaw_design import PairMargins, YawDesign
 from host.sysid.models import Trim
 
 DRIVE = Actuator("aileron", 0.4, 0.03, 8.0, 0.1, 4.0, 0.01, 0.005)
@@ -249,3 +253,19 @@ def test_elevons_have_half_the_travel_and_twice_the_gains() -> None:
     assert float(tail.loop(gains, 15.0).step(state, np.array(0.2), np.array(0.0))[1]) == float(
         whole
     )
+
+
+def test_a_rudders_gains_go_out_with_the_others() -> None:
+    structure = ardupilot_yaw.structure({}, 15.0)
+    mixed = PairProblem(problem(0.0), {}, DRIVE, structure)
+    margins = PairMargins((7.0, 80.0), (8.0, 50.0), 0.7, True, 0.05, 0.1, 0.06, 0.08)
+    before = {"KFF_RDDRMIX": 0.5}
+    yaw = YawTuning(mixed, YawDesign({"DAMP": 0.75, "MIX": 0.5}, margins, 1), before)
+    found = Tuning(AUTOPILOTS["ardupilot"], "mine", (), (), yaw=yaw)
+    assert found.gains == {"YAW2SRV_DAMP": 0.75, "KFF_RDDRMIX": 0.5}
+    assert [one.name for one in found.changes] == ["YAW2SRV_DAMP"]
+    assert "YAW2SRV_DAMP,0  # before: 0.75" in found.to_restore()
+    assert "at the rudder:         at least 8.0 dB, 50 deg" in found.to_text()
+    assert found.margins["yaw"]["both_disk"] == 0.7
+    rest = YawTuning(mixed, YawDesign(None, margins, 1), before)
+    assert Tuning(AUTOPILOTS["ardupilot"], "mine", (), (), yaw=rest).changes == ()

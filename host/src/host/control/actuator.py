@@ -11,7 +11,7 @@ from host.arrays import Array
 from host.control.control_error import ControlError
 from host.instrument.deviations import sensor_error_model
 
-SURFACES = {"roll": "aileron", "pitch": "elevator"}
+SURFACES = {"roll": "aileron", "pitch": "elevator", "yaw": "rudder"}
 # A pulse every 20 ms holds the output for that long: half of it as delay, and none of it where the
 # pulse has just gone out (ArduPlane, PX4 and INAV write servos at 50 Hz unless told otherwise).
 PULSE_PERIOD_S = 0.020
@@ -65,7 +65,7 @@ def actuator_of(aircraft: str, axis: str, travel_rad: float | None = None) -> Ac
     aircraft : str
         Name or file.
     axis : str
-        ``roll`` or ``pitch``.
+        ``roll``, ``pitch`` or ``yaw``.
     travel_rad : float, optional
         Angle at full output, in place of the file's limit of the surface.
 

@@ -16,7 +16,7 @@ ANGLES = {"roll": "phi_rad", "pitch": "theta_rad"}
 
 @dataclass(frozen=True, slots=True)
 class Plant:
-    """A sampled linear system from share of travel to measured angle (rad) and rate (rad/s)."""
+    """A sampled linear system from shares of travel to measured angles (rad) and rates (rad/s)."""
 
     a: Array
     b: Array
@@ -24,11 +24,15 @@ class Plant:
     period_s: float
 
     def response(self, frequency_radps: Array) -> Spectra:
-        """Return angle and rate per unit of output at each frequency, shape (F, 2)."""
+        """Return angle and rate per unit of the one output at each frequency, shape (F, 2)."""
+        return self.transfer(frequency_radps)[..., 0]
+
+    def transfer(self, frequency_radps: Array) -> Spectra:
+        """Return what is measured per unit of each output, shape (F, measured, outputs)."""
         z = np.exp(1j * frequency_radps * self.period_s)
         left = z[:, None, None] * np.eye(len(self.a)) - self.a
-        column = np.broadcast_to(self.b.astype(complex), (len(z), *self.b.shape))
-        return np.asarray((self.c @ np.linalg.solve(left, column))[..., 0])
+        columns = np.broadcast_to(self.b.astype(complex), (len(z), *self.b.shape))
+        return np.asarray(self.c @ np.linalg.solve(left, columns))
 
 
 def continuous(
@@ -72,7 +76,7 @@ def continuous(
 
 
 def sampled(system: tuple[Array, Array, Array], delay_s: float, period_s: float) -> Plant:
-    """Return a system behind a held output and a delay, exactly.
+    """Return a system behind held outputs and one delay of all of them, exactly.
 
     A delay between two samples splits the held input (Astrom & Wittenmark, Computer-Controlled
     Systems, 3rd ed., section 2.6).
@@ -80,12 +84,12 @@ def sampled(system: tuple[Array, Array, Array], delay_s: float, period_s: float)
     from scipy.linalg import expm
 
     a, b, c = system
-    n = len(a)
+    n, m = b.shape
     whole = int(delay_s / period_s)
     late = delay_s - whole * period_s
 
     def held(span_s: float) -> tuple[Array, Array]:
-        joint = np.zeros((n + 1, n + 1))
+        joint = np.zeros((n + m, n + m))
         joint[:n, :n], joint[:n, n:] = a * span_s, b * span_s
         e = expm(joint)
         return e[:n, :n], e[:n, n:]
@@ -94,16 +98,16 @@ def sampled(system: tuple[Array, Array, Array], delay_s: float, period_s: float)
     _, old = held(late)
     transition, _ = held(period_s)
     # Past outputs u[k-1] ... u[k-whole-1] are states.
-    size = n + whole + 1
-    full, into = np.zeros((size, size)), np.zeros((size, 1))
+    size = n + m * (whole + 1)
+    full, into = np.zeros((size, size)), np.zeros((size, m))
     full[:n, :n] = transition
-    full[:n, [n + whole]] = after @ old
+    full[:n, size - m :] = after @ old
     if whole:
-        full[:n, [n + whole - 1]] = new
+        full[:n, size - 2 * m : size - m] = new
     else:
         into[:n] = new
-    into[n, 0] = 1.0
-    full[n + 1 :, n : n + whole] = np.eye(whole)
+    into[n : n + m] = np.eye(m)
+    full[n + m :, n : size - m] = np.eye(m * whole)
     out = np.zeros((c.shape[0], size))
     out[:, :n] = c
     return Plant(full, into, out, period_s)

@@ -145,9 +145,9 @@ class Scenarios:
         size = max(len(one.plant.a) for row in self.of_speed for one in row)
         return [
             (
-                np.stack([_padded(one.plant.a, size, size) for one in row]),
-                np.stack([_padded(one.plant.b, size, 1) for one in row]),
-                np.stack([_padded(one.plant.c, 2, size) for one in row]),
+                np.stack([padded(one.plant.a, size, size) for one in row]),
+                np.stack([padded(one.plant.b, size, 1) for one in row]),
+                np.stack([padded(one.plant.c, 2, size) for one in row]),
             )
             for row in self.of_speed
         ]
@@ -256,7 +256,7 @@ def closed(a: Array, b: Array, c: Array, law: tuple[Array, Array, Array, Array])
     return full
 
 
-def _padded(matrix: Array, rows: int, columns: int) -> Array:
+def padded(matrix: Array, rows: int, columns: int) -> Array:
     wide = np.zeros((rows, columns))
     wide[: matrix.shape[0], : matrix.shape[1]] = matrix
     return wide

@@ -15,47 +15,23 @@ from host.aircraft.file import load_measured
 from host.constants import NORMAL_95
 from host.control.actuator import actuator_of
 from host.control.autopilots.known import AUTOPILOTS, Autopilot
+from host.control.axis_tuning import AxisTuning, YawTuning, changes_of
 from host.control.bandwidth_costs import bandwidth_costs
 from host.control.control_error import ControlError
 from host.control.disturbances import gyro_noise_radps
-from host.control.loop_design import Design, design
+from host.control.lateral_pair import PairProblem
+from host.control.loop_design import design
 from host.control.parameter_file import Change, taken_back
 from host.control.plant import RATES
 from host.control.scenarios import Problem
 from host.control.uncertain_axis import UncertainAxis, axes_of, axes_of_models
 from host.control.verification import UNSEEN
+from host.control.yaw_design import PairMargins, design_yaw
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from host.sysid.pipeline import Identification
-
-
-@dataclass(frozen=True)
-class AxisTuning:
-    """One axis: what was asked, what was found, what was before."""
-
-    problem: Problem
-    design: Design
-    before: Mapping[str, float]
-    costs: tuple[tuple[str, float], ...] = ()
-
-    @property
-    def axis(self) -> str:
-        """``roll`` or ``pitch``."""
-        return self.problem.axis.axis
-
-    @property
-    def changes(self) -> tuple[Change, ...]:
-        """Parameters whose value is another than before; none where no gains hold."""
-        settings = self.problem.structure.settings
-        found = []
-        for role, value in (self.design.gains or {}).items():
-            known = settings[role]
-            old = self.before.get(known.name)
-            if old is None or abs(old - value) > 0.5 * known.step:
-                found.append(Change(known.name, round(value, 6), old, known.unit))
-        return tuple(found)
 
 
 @dataclass(frozen=True)
@@ -67,6 +43,8 @@ class Tuning:
     autopilot : Autopilot
     aircraft : str
     axes : tuple of AxisTuning
+    yaw : YawTuning or None
+        Of the rudder, where the autopilot flies a damper and the answer has a model for it.
     dated : str
         Day of the covariance that the gains hold over.
     notes : tuple of str
@@ -78,25 +56,34 @@ class Tuning:
     axes: tuple[AxisTuning, ...]
     notes: tuple[str, ...]
     dated: str = ""
+    yaw: YawTuning | None = None
+
+    @property
+    def tuned(self) -> tuple[AxisTuning | YawTuning, ...]:
+        """Axes, and the rudder behind them."""
+        return (*self.axes, *([self.yaw] if self.yaw else []))
 
     @property
     def gains(self) -> dict[str, float]:
         """Every gain by the autopilot's own name; axes without gains have none."""
         return {
-            one.problem.structure.settings[role].name: round(value, 6)
-            for one in self.axes
+            one.settings[role].name: round(value, 6)
+            for one in self.tuned
             for role, value in (one.design.gains or {}).items()
         }
 
     @property
     def changes(self) -> tuple[Change, ...]:
         """Parameters that change."""
-        return tuple(change for one in self.axes for change in one.changes)
+        return tuple(change for one in self.tuned for change in changes_of(one))
 
     @property
     def margins(self) -> dict[str, dict[str, float]]:
         """Worst margins of each axis over the unseen aircraft."""
-        return {one.axis: dict(_worst(one)) for one in self.axes}
+        found = {one.axis: dict(_worst(one)) for one in self.axes}
+        if self.yaw is not None:
+            found["yaw"] = dict(_worst_of_pair(self.yaw.design.margins))
+        return found
 
     def to_param(self) -> str:
         """Return the changed parameters as the file that the ground station loads."""
@@ -122,9 +109,7 @@ class Tuning:
     def to_restore(self) -> str:
         """Return the file that takes them back."""
         defaults = {
-            setting.name: setting.default
-            for one in self.axes
-            for setting in one.problem.structure.settings.values()
+            setting.name: setting.default for one in self.tuned for setting in one.settings.values()
         }
         heading: dict[str, str | float] = {
             "aircraft": self.aircraft, "back_to": "the values before host tune"
@@ -242,8 +227,30 @@ def tune(
         costs = bandwidth_costs(problem, best.gains) if best.gains else []
         found.append(AxisTuning(problem, best, logged, tuple(costs)))
     flown = () if isinstance(source, Sequence) else _airspeeds_mps(source)
-    notes = tuple(_notes(found, chosen, logged, flown))
-    return Tuning(chosen, loaded.name, tuple(found), notes, dated.isoformat())
+    notes = list(_notes(found, chosen, logged, flown))
+    yaw = None
+    try:
+        yaw = _rudder(chosen, aircraft, found, seed)
+    except ControlError as error:
+        notes.append(f"no yaw damper: {error}")
+    return Tuning(chosen, loaded.name, tuple(found), tuple(notes), dated.isoformat(), yaw)
+
+
+def _rudder(
+    chosen: Autopilot, aircraft: str, axes: Sequence[AxisTuning], seed: int
+) -> YawTuning | None:
+    """Return the rudder around tuned roll gains; None where the autopilot flies no damper."""
+    if chosen.yaw is None:
+        return None
+    roll = next((one for one in axes if one.axis == "roll" and one.design.gains), None)
+    if roll is None or roll.design.gains is None:
+        raise ControlError("roll has no gains to tune it around")
+    axis = roll.problem.axis
+    if "N_dr" not in axis.names:
+        raise ControlError(f"model '{axis.template}' has no rudder, expected lateral with N_dr")
+    law = chosen.yaw(roll.before, axis.trim.airspeed_mps)
+    problem = PairProblem(roll.problem, roll.design.gains, actuator_of(aircraft, "yaw"), law)
+    return YawTuning(problem, design_yaw(problem, seed=seed), roll.before)
 
 
 def _speeds(scalars: Mapping[str, float], axis: UncertainAxis) -> tuple[float, ...]:
@@ -307,6 +314,15 @@ def _notes(
                 f"the {drive.surface}'s servo is not in the aircraft file: {drive.bandwidth_hz:.1f}"
                 f" Hz +- {100.0 * NORMAL_95 * drive.bandwidth_share:.0f} % stand for it"
             )
+
+
+def _worst_of_pair(found: PairMargins) -> Iterator[tuple[str, float]]:
+    for name, (gain_db, phase_deg) in (("aileron", found.aileron), ("rudder", found.rudder)):
+        yield f"{name}_gain_db", gain_db
+        yield f"{name}_phase_deg", phase_deg
+    yield "both_disk", found.joint_disk
+    yield "yaw_in_gusts_radps", found.yaw_radps
+    yield "sideslip_per_bank", found.sideslip
 
 
 def _worst(one: AxisTuning) -> Iterator[tuple[str, float]]:

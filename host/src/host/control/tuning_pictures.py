@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from host.control.tuning import AxisTuning
+    from host.control.axis_tuning import AxisTuning
 
 DRAWN, SEED = 60, 9_000  # aircraft, of a drawing of their own
 SECONDS = 5.0

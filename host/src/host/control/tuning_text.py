@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from host.control.axis_tuning import AxisTuning, YawTuning, changes_of
 from host.control.verification import UNSEEN
 
 if TYPE_CHECKING:
-    from host.control.tuning import AxisTuning, Tuning
+    from host.control.tuning import Tuning
 
 FIRST_FLIGHT = (
     "First flight",
@@ -30,6 +33,9 @@ def tuning_lines(found: Tuning) -> Iterator[str]:
     for axis in found.axes:
         yield ""
         yield from _axis_lines(axis)
+    if found.yaw is not None:
+        yield ""
+        yield from _yaw_lines(found.yaw)
     if not found.changes:
         return
     yield ""
@@ -52,14 +58,7 @@ def _axis_lines(one: AxisTuning) -> Iterator[str]:
         yield f"  least known: {_widest(one)}; fly more inputs of the {problem.actuator.surface}"
         return
     yield f"{one.axis}: at {speeds} m/s"
-    changed = {change.name: change for change in one.changes}
-    for role, value in one.design.gains.items():
-        setting = problem.structure.settings[role]
-        change = changed.get(setting.name)
-        old = "as before"
-        if change is not None:
-            old = f"before: {'not known' if change.old is None else f'{change.old:g}'}"
-        yield f"  {setting.name:20s} {value:8.4g} {setting.unit:13s} {old}"
+    yield from _gain_lines(one)
     for name, loop in (("at the surface", proven.actuator), ("attitude", proven.attitude)):
         yield (
             f"  {name + ' loop:':22s} at least {loop.gain_db.min():.1f} dB,"
@@ -77,6 +76,35 @@ def _axis_lines(one: AxisTuning) -> Iterator[str]:
     yield (
         f"  {UNSEEN} unseen aircraft hold: 95 % of all do, with 99.9 % confidence"
         f" ({one.design.rounds} design{'s' * (one.design.rounds > 1)})"
+    )
+
+
+def _gain_lines(one: AxisTuning | YawTuning) -> Iterator[str]:
+    changed = {change.name: change for change in changes_of(one)}
+    for role, value in (one.design.gains or {}).items():
+        setting = one.settings[role]
+        change = changed.get(setting.name)
+        old = "as before" if change is None else change.before
+        yield f"  {setting.name:20s} {value:8.4g} {setting.unit:13s} {old}"
+
+
+def _yaw_lines(one: YawTuning) -> Iterator[str]:
+    proven = one.design.margins
+    if one.design.gains is None:
+        yield "yaw: no damper holds 6 dB and 45 deg with these roll gains: the rudder's stay"
+        return
+    yield "yaw: around these roll gains"
+    yield from _gain_lines(one)
+    for name, (gain_db, phase_deg) in (("rudder", proven.rudder), ("aileron", proven.aileron)):
+        yield f"  {'at the ' + name + ':':22s} at least {gain_db:.1f} dB, {phase_deg:.0f} deg"
+    yield f"  both at once:          disk {proven.joint_disk:.2f}"
+    yield (
+        f"  yaw in side gusts of 1 m/s: {np.degrees(proven.yaw_radps):.1f} deg/s rms at most,"
+        f" {np.degrees(proven.before_yaw_radps):.1f} with the rudder at rest"
+    )
+    yield (
+        f"  sideslip in a roll: {100.0 * proven.sideslip:.1f} % of the bank,"
+        f" {100.0 * proven.before_sideslip:.1f} % with the rudder at rest"
     )
 
 

@@ -67,7 +67,7 @@ class UncertainAxis:
         return np.asarray(self.mean + rng.standard_normal((count, len(self.mean))) @ root.T)
 
     def matrices(self, values: Array, airspeed_mps: float) -> tuple[Array, Array, tuple[str, ...]]:
-        """Return A, B of the first input (its own surface) and the states, at another airspeed.
+        """Return A, B with its own surface first, and the states, at another airspeed.
 
         Coefficients are those of the trim: what changes them with the angle of attack is left out.
 
@@ -86,7 +86,7 @@ class UncertainAxis:
         }
         full = [scaled.get(one.name, 0.0) for one in model.parameters]
         a, b, _, _ = model.matrices(np.array(full))
-        return a, b[:, :1], model.states
+        return a, b, model.states
 
     @property
     def sense(self) -> float:

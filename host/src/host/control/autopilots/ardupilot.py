@@ -20,6 +20,7 @@ from host.control.autopilots.parameter_table import smoothing
 from host.control.autopilots.structure import Setting
 
 ELEVONS, V_TAIL = {77, 78}, {79, 80}  # SERVOn_FUNCTION
+MIXED = {"roll": ELEVONS, "pitch": ELEVONS | V_TAIL, "yaw": V_TAIL}
 MIXING_GAIN = 0.5  # its default
 FULL_RAD = math.pi / 4.0  # of the controllers' output: 45 notional degrees
 
@@ -147,10 +148,10 @@ def structure(axis: str, logged: Mapping[str, float], trim_mps: float) -> ArduPl
 
 
 def mixer_share(axis: str, logged: Mapping[str, float]) -> float:
-    """Return the share of travel that elevons, or the pitch of a V-tail, have at full output.
+    """Return the share of travel that one axis of elevons or of a V-tail has at full output.
 
     servos.cpp: each side is the sum of two axes times MIXING_GAIN.
     """
     functions = {int(v) for name, v in logged.items() if re.fullmatch(r"SERVO\d+_FUNCTION", name)}
-    mixed = functions & (ELEVONS if axis == "roll" else ELEVONS | V_TAIL)
+    mixed = functions & MIXED[axis]
     return logged.get("MIXING_GAIN", MIXING_GAIN) if mixed else 1.0

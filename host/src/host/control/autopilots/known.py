@@ -5,8 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from host.control.autopilots import ardupilot, inav, mega, parameter_table, px4
-from host.control.autopilots.structure import Structure
+from host.control.autopilots import (
+    ardupilot,
+    ardupilot_yaw,
+    inav,
+    mega,
+    parameter_table,
+    px4,
+    px4_yaw,
+)
+from host.control.autopilots.structure import Structure, YawStructure
 from host.control.parameter_file import (
     Writer,
     cli_text,
@@ -27,6 +35,8 @@ class Autopilot:
         From an axis, parameters by name and the airspeed of the model.
     text : callable
         From changes and a heading to the file that its ground station loads.
+    yaw : callable or None
+        From parameters by name and the airspeed of the model; None where no damper is flown.
     travel_rad : float or None
         Angle of the surface at full output; None where that is the aircraft file's limit.
     """
@@ -34,6 +44,7 @@ class Autopilot:
     name: str
     structure: Callable[[str, Mapping[str, float], float], Structure]
     text: Writer
+    yaw: Callable[[Mapping[str, float], float], YawStructure] | None = None
     travel_rad: float | None = None
 
     @property
@@ -45,9 +56,9 @@ class Autopilot:
 AUTOPILOTS = {
     one.name: one
     for one in (
-        Autopilot("ardupilot", ardupilot.structure, mission_planner_text),
-        Autopilot("px4", px4.structure, qgroundcontrol_text),
+        Autopilot("ardupilot", ardupilot.structure, mission_planner_text, ardupilot_yaw.structure),
+        Autopilot("px4", px4.structure, qgroundcontrol_text, px4_yaw.structure),
         Autopilot("inav", inav.structure, cli_text),
-        Autopilot("mega", mega.structure, toml_text, mega.FULL_RAD),
+        Autopilot("mega", mega.structure, toml_text, travel_rad=mega.FULL_RAD),
     )
 }

@@ -27,7 +27,7 @@ LOGGED = {
     "gyro_filter_hz": "IMU_GYRO_CUTOFF",
     "loop_hz": "IMU_GYRO_RATEMAX",
 }
-TORQUES = {"roll": r"CA_SV_CS\d+_TRQ_R", "pitch": r"CA_SV_CS\d+_TRQ_P"}
+TORQUES = {axis: rf"CA_SV_CS\d+_TRQ_{axis[0].upper()}" for axis in ("roll", "pitch", "yaw")}
 LOWEST_MPS = 0.1  # that the scale divides by
 
 

@@ -97,6 +97,27 @@ class Structure(Protocol):
         """Return the loop with gains by their role, at an airspeed."""
 
 
+class YawStructure(Protocol):
+    """An autopilot's rudder before it has gains: a damper, and a share of the aileron."""
+
+    @property
+    def settings(self) -> Mapping[str, Setting]:
+        """Parameters that are tuned, by their role; ``MIX`` is the aileron's share."""
+
+    @property
+    def damper(self) -> str:
+        """Role of the gain from yaw rate."""
+
+    def completed(self, damper: float, mix: float, feed_forward: float) -> dict[str, float]:
+        """Return every gain on its own steps; `feed_forward` as in `Structure`."""
+
+    def loop(self, gains: Mapping[str, float], airspeed_mps: float) -> Loop:
+        """Return the loop from bank (`angle_error` is what is missing to level) and yaw rate."""
+
+    def mix(self, gains: Mapping[str, float]) -> float:
+        """Return the share of rudder travel per share of aileron travel."""
+
+
 def state_space(loop: Loop) -> tuple[Array, Array, Array, Array]:
     """Return A, B, C, D of a loop from measured angle and rate to its output.
 
