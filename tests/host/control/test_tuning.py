@@ -18,6 +18,7 @@ from host.control.bandwidth_costs import bandwidth_costs, known
 from host.control.disturbances import gyro_noise_radps
 from host.control.lateral_pair import PairProblem
 from host.control.loop_design import Design, design, feed_forward, search
+from host.control.outer_loops import OuterCheck
 from host.control.parameter_file import Change, taken_back
 from host.control.scenarios import Problem, draw
 from host.control.tuning import Tuning
@@ -269,3 +270,11 @@ def test_a_rudders_gains_go_out_with_the_others() -> None:
     assert found.margins["yaw"]["both_disk"] == 0.7
     rest = YawTuning(mixed, YawDesign(None, margins, 1), before)
     assert Tuning(AUTOPILOTS["ardupilot"], "mine", (), (), yaw=rest).changes == ()
+
+
+def test_what_is_around_is_told_and_not_changed() -> None:
+    outer = OuterCheck("path (L1)", 18.7, 51.0, True, {"NAVL1_PERIOD": 17.0})
+    found = Tuning(AUTOPILOTS["ardupilot"], "mine", (), (), outer=(outer,))
+    assert "path (L1): at least 18.7 dB, 51 deg: NAVL1_PERIOD 17" in found.to_text()
+    assert found.document()["outer_loops"]["path (L1)"]["stable"] is True
+    assert found.changes == ()

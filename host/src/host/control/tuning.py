@@ -21,6 +21,7 @@ from host.control.control_error import ControlError
 from host.control.disturbances import gyro_noise_radps
 from host.control.lateral_pair import PairProblem
 from host.control.loop_design import design
+from host.control.outer_loops import OuterCheck, check
 from host.control.parameter_file import Change, taken_back
 from host.control.plant import RATES
 from host.control.scenarios import Problem
@@ -45,6 +46,8 @@ class Tuning:
     axes : tuple of AxisTuning
     yaw : YawTuning or None
         Of the rudder, where the autopilot flies a damper and the answer has a model for it.
+    outer : tuple of OuterCheck
+        Path and height loops around, as far as the autopilot's were read.
     dated : str
         Day of the covariance that the gains hold over.
     notes : tuple of str
@@ -57,6 +60,7 @@ class Tuning:
     notes: tuple[str, ...]
     dated: str = ""
     yaw: YawTuning | None = None
+    outer: tuple[OuterCheck, ...] = ()
 
     @property
     def tuned(self) -> tuple[AxisTuning | YawTuning, ...]:
@@ -130,6 +134,15 @@ class Tuning:
             ],
             "margins": self.margins,
             "bandwidth_costs": {one.axis: dict(one.costs) for one in self.axes},
+            "outer_loops": {
+                one.title: {
+                    "gain_db": one.gain_db,
+                    "phase_deg": one.phase_deg,
+                    "stable": one.stable,
+                    "parameters": dict(one.parameters),
+                }
+                for one in self.outer
+            },
             "refused": [one.axis for one in self.axes if one.design.gains is None],
             "notes": list(self.notes),
         }
@@ -233,7 +246,19 @@ def tune(
         yaw = _rudder(chosen, aircraft, found, seed)
     except ControlError as error:
         notes.append(f"no yaw damper: {error}")
-    return Tuning(chosen, loaded.name, tuple(found), tuple(notes), dated.isoformat(), yaw)
+    outer = tuple(_around(chosen, found, logged, seed))
+    return Tuning(chosen, loaded.name, tuple(found), tuple(notes), dated.isoformat(), yaw, outer)
+
+
+def _around(
+    chosen: Autopilot, axes: Sequence[AxisTuning], logged: Mapping[str, float], seed: int
+) -> Iterator[OuterCheck]:
+    """Yield what the loops around do on aircraft of a drawing of their own."""
+    for outer in chosen.outer(logged) if chosen.outer else ():
+        for one in axes:
+            whole = one.problem.axis.template in ("lateral", "longitudinal")
+            if one.axis == outer.axis and one.design.gains and whole:
+                yield check(outer, one.problem, one.design.gains, 1000 * seed + 900)
 
 
 def _rudder(

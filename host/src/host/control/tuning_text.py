@@ -36,6 +36,10 @@ def tuning_lines(found: Tuning) -> Iterator[str]:
     if found.yaw is not None:
         yield ""
         yield from _yaw_lines(found.yaw)
+    if found.outer:
+        yield ""
+        yield "around these, not tuned:"
+        yield from (f"  {one.line}" for one in found.outer)
     if not found.changes:
         return
     yield ""

@@ -15,6 +15,7 @@ from host.control.autopilots import (
     px4_yaw,
 )
 from host.control.autopilots.structure import Structure, YawStructure
+from host.control.outer_loops import OuterLoop, arduplane_loops, px4_loops
 from host.control.parameter_file import (
     Writer,
     cli_text,
@@ -37,6 +38,8 @@ class Autopilot:
         From changes and a heading to the file that its ground station loads.
     yaw : callable or None
         From parameters by name and the airspeed of the model; None where no damper is flown.
+    outer : callable or None
+        From parameters by name to the loops around, which are checked alone.
     travel_rad : float or None
         Angle of the surface at full output; None where that is the aircraft file's limit.
     """
@@ -45,6 +48,7 @@ class Autopilot:
     structure: Callable[[str, Mapping[str, float], float], Structure]
     text: Writer
     yaw: Callable[[Mapping[str, float], float], YawStructure] | None = None
+    outer: Callable[[Mapping[str, float]], tuple[OuterLoop, ...]] | None = None
     travel_rad: float | None = None
 
     @property
@@ -56,8 +60,14 @@ class Autopilot:
 AUTOPILOTS = {
     one.name: one
     for one in (
-        Autopilot("ardupilot", ardupilot.structure, mission_planner_text, ardupilot_yaw.structure),
-        Autopilot("px4", px4.structure, qgroundcontrol_text, px4_yaw.structure),
+        Autopilot(
+            "ardupilot",
+            ardupilot.structure,
+            mission_planner_text,
+            ardupilot_yaw.structure,
+            arduplane_loops,
+        ),
+        Autopilot("px4", px4.structure, qgroundcontrol_text, px4_yaw.structure, px4_loops),
         Autopilot("inav", inav.structure, cli_text),
         Autopilot("mega", mega.structure, toml_text, travel_rad=mega.FULL_RAD),
     )

@@ -40,6 +40,11 @@ def fixed(
     return {**_document(autopilot)["fixed"], **known}
 
 
+def named(autopilot: str, table: str, logged: Mapping[str, float]) -> dict[str, float]:
+    """Return parameters of a table by the autopilot's own names, a log's where it has them."""
+    return {k: float(logged.get(k, usual)) for k, usual in _document(autopilot)[table].items()}
+
+
 def words(autopilot: str) -> Mapping[str, str]:
     """Return what the first flight's page calls its modes and gains."""
     found: Mapping[str, str] = _document(autopilot)["words"]
