@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from host.cli import main
 from host.errors import UsageError
 from host.placed_arguments import PlacedParser, StorePlaced, of_each, stretches_of_each
 
@@ -68,3 +69,9 @@ def test_an_unknown_option_is_still_unknown(capsys: pytest.CaptureFixture[str]) 
     with pytest.raises(SystemExit):
         parsed("a --mop m")
     assert "unrecognized arguments: --mop" in capsys.readouterr().err
+
+
+def test_a_second_file_to_write_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    """The first was forgotten without a word."""
+    assert main(["identify", "x.csv", "--save-model", "a.toml", "--save-model", "b.mat"]) == 2
+    assert "given twice, a.toml and b.mat" in capsys.readouterr().err

@@ -95,6 +95,20 @@ class StorePlaced(argparse.Action):
         setattr(namespace, self.dest, [*(getattr(namespace, self.dest) or ()), placed])
 
 
+class StoreOnce(argparse.Action):
+    """Store a file to write, and refuse a second one: the first would silently not be written."""
+
+    def __call__(
+        self, parser: Any, namespace: Any, values: Any, option_string: str | None = None
+    ) -> None:
+        """Store one value."""
+        first = getattr(namespace, self.dest)
+        if first is not None:
+            text = f"given twice, {first} and {values}; one run writes one"
+            raise argparse.ArgumentError(self, text)
+        setattr(namespace, self.dest, values)
+
+
 def flattened(flights: Iterable[Sequence[Path]]) -> list[Path]:
     """Return the flights of all files, in order."""
     return [flight for every in flights for flight in every]

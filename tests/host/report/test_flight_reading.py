@@ -11,6 +11,8 @@ from host.report.shown_flight import ShownFlight, with_gaps
 
 from tests.host.report.flights import DOUBLETS_S, JUMP_S, LOST_S
 
+THOR = Path(__file__).parents[2] / "data" / "thor75"
+
 
 def test_test_points_are_those_of_host_maneuvers(
     flight: ShownFlight, log_file: Path, capsys: pytest.CaptureFixture[str]
@@ -33,6 +35,20 @@ def test_of_original_rows_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     listed = json.loads(capsys.readouterr().out)["maneuvers"]
     found = read_flight(FlightRequest(rows))[0].maneuvers
     assert [one["start_s"] for one in listed] == pytest.approx([item.start_s for item, _ in found])
+
+
+def test_a_table_with_a_map_is_shown_as_it_is_identified(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = [str(THOR / "flight75_240_270.csv"), "--map", str(THOR / "map.toml")]
+    assert main(["maneuvers", *asked, "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)["maneuvers"]
+    assert main(["plot", *asked, "-o", str(tmp_path / "page.html")]) == 0
+    found = read_flight(FlightRequest(Path(asked[0]), mapping=Path(asked[2])))[0]
+    starts = [item.start_s for item, _ in found.maneuvers]
+    assert [one["start_s"] for one in listed] == pytest.approx(starts)
+    assert "p_radps" in found.columns
+    assert main(["plot", asked[0]]) == 2  # nobody says what its columns are
 
 
 def test_a_loss_is_a_gap_and_is_listed(flight: ShownFlight) -> None:

@@ -139,10 +139,10 @@ def _losses(losses: Mapping[str, Any]) -> Iterator[str]:
 def _calibration(note: Mapping[str, Any]) -> Iterator[str]:
     yield _row("calibration", f"{note['name']} {note['date']}".strip())
     if note["default_columns"]:
-        yield _row("", "DEFAULT numbers, not measured on this instrument, in: ")
-        names = note["default_columns"]
-        for at in range(0, len(names), 6):
-            yield _row("", "  " + ", ".join(names[at : at + 6]))
+        count = len(note["default_columns"])
+        yield _row(
+            "", f"DEFAULT numbers, not measured on this instrument, in {count} columns (--json)"
+        )
 
 
 def _row(label: str, text: str) -> str:

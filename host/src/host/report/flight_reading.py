@@ -34,10 +34,11 @@ from host.report.gps_position import (
     log_utc_s,
 )
 from host.report.shown_flight import Happening, ServoJump, ShownFlight, with_gaps
-from host.sysid.flight import read_columns
+from host.sysid.flight import read_columns, read_flight_columns
 from host.sysid.maneuvers import DetectedManeuver, Grade, detect_maneuvers, grade
 from host.text import shown
 
+TABLES = (".csv", ".parquet", ".mat")
 _HEAD_BYTES = 4096
 _TEXTS = {column.name: column.text for column in COLUMNS}
 # Events whose number is a word (protocol/frames.toml).
@@ -58,6 +59,7 @@ class FlightRequest:
     calibration: Path | None = None
     row_rate_hz: float | None = None
     sensors: tuple[tuple[str, int | str], ...] = ()
+    mapping: Path | None = None  # foreign names, units and signs of a table
     maneuvers: bool = True  # whether test points are looked for
 
 
@@ -72,6 +74,10 @@ def read_flight(wanted: FlightRequest) -> tuple[ShownFlight, Path]:
     path = readable_file(pick(check_source(wanted.source)))
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
+    kind = path.suffix.lower()
+    if wanted.mapping is not None or (kind in TABLES and not looks_like_rows(head)):
+        _refuse(wanted, path, "a table", ("file-id", "row-rate", "calibration", "sensor"))
+        return _of_table(wanted, path), path
     if looks_like_rows(head):
         _refuse(wanted, path, "original ASCII rows", ("flight", "file-id", "sensor"))
         return _of_rows(wanted, path), path
@@ -163,6 +169,32 @@ def _of_rows(wanted: FlightRequest, path: Path) -> ShownFlight:
         position=changed_position(table.columns),
         calibration=calibration_values(calibration),
         calibration_text=calibration.text,
+    )
+
+
+def _of_table(wanted: FlightRequest, path: Path) -> ShownFlight:
+    found = read_flight_columns(with_flight(path, wanted.session), wanted.mapping)
+    columns = found.columns
+    summary = {
+        "format": "table",
+        "complete": "as it was given",
+        "duration_s": float(columns["t_s"][-1] - columns["t_s"][0]),
+        "rows": len(columns["t_s"]),
+        "losses": {"ranges": [], "ending": ""},
+    }
+    notes = [*found.notes, *(finding.line for finding in found.findings)]
+    maneuvers, why = _maneuvers(columns) if wanted.maneuvers else ([], [])
+    return ShownFlight(
+        name=shown(path.name),
+        columns=with_gaps(columns),
+        units={name: UNITS.get(name, "") for name in columns},
+        texts=_TEXTS,
+        lines=list(map(shown, notes)),
+        summary=summary,
+        maneuvers=maneuvers,
+        shares=found.shares,
+        notes=[*map(shown, notes), *why],
+        position=changed_position(columns),
     )
 
 

@@ -47,6 +47,7 @@ def plot_frequency(request: FrequencyRequest) -> Plotted:
         aircraft=request.aircraft,
         models=list(request.models) or None,
         calibration=wanted.calibration,
+        mapping=wanted.mapping,
         sensors=dict(wanted.sensors),
         row_rate_hz=wanted.row_rate_hz,
     )

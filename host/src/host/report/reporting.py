@@ -16,7 +16,7 @@ from host.readers.autopilot_flight import is_autopilot_log
 from host.readers.flight_choice import file_and_flight
 from host.readers.foreign_tables import TEXT_KINDS
 from host.readers.readable_file import readable_file
-from host.report.flight_reading import FlightRequest, read_flight
+from host.report.flight_reading import TABLES, FlightRequest, read_flight
 from host.report.plotting import page_file, write_text
 from host.report.provenance import hashes, versions
 from host.report.report_page import ReportParts, report_page
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 BESIDE = "equation-error"
 _HEAD_BYTES = 4096
-_TABLES = (".csv", ".parquet", ".mat")
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +116,7 @@ def _flight(
     source: Path, calibration: Path | None, options: Mapping[str, Any]
 ) -> ShownFlight | None:
     """Return a log as a flight to show; None for a table, which has no events and losses."""
-    if readable_file(file_and_flight(source)[0]).suffix.lower() in _TABLES:
+    if readable_file(file_and_flight(source)[0]).suffix.lower() in TABLES:
         return None
     try:
         return read_flight(_flight_request(source, calibration, options))[0]

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from host.decode.newest_flight import source_or_newest
 from host.placed_arguments import (
+    StoreOnce,
     StorePlaced,
     flattened,
     of_each,
@@ -91,11 +92,13 @@ def _add_outputs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--full", action="store_true", help="print every number: constants,"
                         " sensors' errors, delays, fit, causes")  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print JSON")
-    parser.add_argument("--mat", type=Path, metavar="FILE", help="write a MAT file")
+    parser.add_argument("--mat", type=Path, metavar="FILE", action=StoreOnce,
+                        help="write a MAT file")  # fmt: skip
     parser.add_argument("--plots", type=Path, metavar="DIR", help="write pictures")
     parser.add_argument(
         "--save-model",
         type=Path,
+        action=StoreOnce,
         metavar="FILE",
         help="write the model as .toml or .mat, .control.py for python-control; with --aircraft as"
         " .xml for JSBSim, -set.xml for FlightGear, .sdf for Gazebo, .h for ArduPilot's SITL, .st"
@@ -104,6 +107,7 @@ def _add_outputs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--save-aircraft",
         type=Path,
+        action=StoreOnce,
         metavar="FILE",
         help="write the aircraft for `host simulate`, with --aircraft",
     )

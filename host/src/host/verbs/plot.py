@@ -32,6 +32,8 @@ def add_parser(subparsers: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_log_arguments(parser)
+    parser.add_argument("--map", type=Path, metavar="TOML",
+                        help="of a table (CSV, Parquet, MAT): as of `host identify`")  # fmt: skip
     add_output(parser, "page to write; <name>.html in the working folder without it", "HTML", Path)
     parser.add_argument("--open", action="store_true", help="open the page in the browser")
     parser.add_argument(
@@ -79,6 +81,7 @@ def flight_request(args: argparse.Namespace) -> Any:
         file_id=args.file_id,
         calibration=args.calibration,
         row_rate_hz=args.row_rate,
+        mapping=getattr(args, "map", None),
         sensors=tuple(log_choices(args.sensor, args.outputs).items()),
     )
 
