@@ -2,7 +2,7 @@
 
 Between law and surface stand a pulse every 20 ms, the end of its travel and the servo with its
 bandwidth and rate; between motion and law the gyro's noise and filter. The throttle stays, the
-rudder too. What the laws keep (integrators) has no limit of its own.
+rudder too.
 """
 
 from __future__ import annotations

@@ -93,6 +93,30 @@ def test_the_law_that_is_analysed_is_the_one_that_flies(autopilot: str) -> None:
         assert linear == pytest.approx(float(flown), rel=1e-9, abs=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("autopilot", "logged", "limit"),
+    [
+        ("ardupilot", {"RLL_RATE_IMAX": 0.2}, 0.2 / (math.pi / 4.0)),
+        ("ardupilot", {}, 0.666 / (math.pi / 4.0)),
+        ("px4", {"FW_RR_IMAX": 0.15}, 0.15),
+        ("inav", {"pid_iterm_limit_percent": 20.0}, 0.2),
+    ],
+)
+def test_an_integral_stays_within_the_limit_of_the_log(
+    autopilot: str, logged: dict[str, float], limit: float
+) -> None:
+    loop = AUTOPILOTS[autopilot].structure("roll", logged, 15.0).loop(GAINS[autopilot], 15.0)
+    state: Array = np.zeros(loop.states)
+    for _ in range(round(60.0 / loop.period_s)):  # a minute of a bank that does not come
+        state, held = loop.step(state, np.array(0.5), np.array(0.0))
+    no_integral = AUTOPILOTS[autopilot].structure("roll", logged, 15.0)
+    other = no_integral.loop({**GAINS[autopilot], "I": 0.0}, 15.0)
+    rest: Array = np.zeros(other.states)
+    for _ in range(round(10.0 / other.period_s)):
+        rest, without = other.step(rest, np.array(0.5), np.array(0.0))
+    assert float(held) - float(without) == pytest.approx(limit, rel=1e-6)
+
+
 def test_px4_multiplies_gains_by_the_square_of_its_speed_scale_and_feed_forward_by_it() -> None:
     law = px4.structure("roll", {"FW_AIRSPD_TRIM": 15.0}, 15.0)
     gains = {"P": 0.2, "I": 0.0, "D": 0.0, "FF": 0.5, "TC": 0.4}

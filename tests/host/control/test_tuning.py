@@ -127,6 +127,30 @@ def test_gains_of_the_hold_carry_aircraft_date_margins_and_sense() -> None:
     assert "First flight" not in found.to_text()
 
 
+@pytest.mark.costs(10, "two searches over twelve aircraft")
+def test_a_log_with_a_low_slew_limit_has_softer_gains() -> None:
+    asked = problem(0.1)
+    seen = draw(asked, seed=1, count=12)
+    free = search(asked, seen, Required())
+    assert free is not None
+    unlimited = float(np.max(seen.output_slew_per_s(free)))
+    # SMAX counts 45 times P and D in radians; gusts reach it 95 % of the time.
+    limit_degps = 0.8 * 1.96 * unlimited * (np.pi / 4.0) * 45.0
+    law = AUTOPILOTS["ardupilot"].structure("roll", {"RLL_RATE_SMAX": limit_degps}, 15.0)
+    slow = replace(seen, problem=replace(asked, structure=law))
+    held = search(asked, slow, Required())
+    assert held is not None
+    assert float(np.max(seen.output_slew_per_s(held))) <= 0.8 * unlimited
+
+
+def test_the_outputs_slew_is_the_surfaces_rate_over_its_travel() -> None:
+    # What gusts move is far below servo and filter.
+    seen = draw(problem(0.0), seed=3, count=1)
+    gains = seen.problem.structure.completed({"P": 0.12, "D": 0.0, "TC": 0.5}, 0.17)
+    ratio = float(seen.surface_rate_radps(gains)[0] / seen.output_slew_per_s(gains)[0])
+    assert ratio == pytest.approx(DRIVE.travel_rad, rel=0.2)
+
+
 def test_an_aircraft_that_answers_the_other_way_is_unstable() -> None:
     # The surfaces are connected as the estimate says: a draw of the other sign is fed back wrongly.
     known = problem(0.0)

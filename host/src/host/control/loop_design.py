@@ -136,6 +136,8 @@ def _worth(seen: Scenarios, gains: Mapping[str, float], asked: Required) -> floa
         return -missing
     limit = SURFACE_SHARE * seen.problem.actuator.rate_limit_radps / NORMAL_95
     over = float(np.max(seen.surface_rate_radps(gains))) / limit - 1.0
+    slew = seen.problem.structure.slew_limit_per_s / NORMAL_95
+    over = max(over, float(np.max(seen.output_slew_per_s(gains))) / slew - 1.0)
     if over > 0.0:
         return -over
     wanted = {"actuator": inner, "attitude": outer}[seen.problem.structure.fastest]

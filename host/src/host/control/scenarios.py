@@ -18,6 +18,7 @@ from host.control.uncertain_axis import UncertainAxis
 
 POINTS = 160  # frequencies; 40 000 move a margin by less than 0.01 dB and 0.05 degrees
 SLOWEST_RADPS = 0.05  # one turn in two minutes
+SLEW_FILTER_RADPS = 2.0 * np.pi * 25.0  # ArduPlane's Filter/SlewLimiter.cpp
 
 
 @dataclass(frozen=True)
@@ -169,17 +170,28 @@ class Scenarios:
 
     def surface_rate_radps(self, gains: Mapping[str, float]) -> Array:
         """Return the rms rate of the surface in gusts of 1 m/s with the gyro's noise."""
-        w, period = self.frequency_radps, self.problem.period_s
+        moved = np.abs(self._surfaces) ** 2 * self._output_power(gains)
+        return np.asarray(np.sqrt(np.trapezoid(moved, self.frequency_radps, axis=-1)).ravel())
+
+    def output_slew_per_s(self, gains: Mapping[str, float]) -> Array:
+        """Return the rms rate of the output, in shares of travel, as a slew limiter sees it."""
+        s = 1j * self.frequency_radps
+        seen = np.abs(s / (1.0 + s / SLEW_FILTER_RADPS)) ** 2
+        power = seen * self._output_power(gains)
+        return np.asarray(np.sqrt(np.trapezoid(power, self.frequency_radps, axis=-1)).ravel())
+
+    def _output_power(self, gains: Mapping[str, float]) -> Array:
+        """Return the output's spectrum in gusts and by noise, shares^2 s, (speeds, N, F)."""
+        period = self.problem.period_s
         inner, _ = self.loops(gains)
         by_angle, by_rate = self._laws(gains)
-        closes = self._surfaces / (1.0 + inner.reshape(self._surfaces.shape))
+        closes = 1.0 / (1.0 + inner.reshape(self._surfaces.shape))
         white = self.problem.gyro_noise_radps**2 * period / np.pi
         power = np.abs(by_rate[:, None]) ** 2 * white
         for moved, spectrum in self._gusts:
             seen = by_angle[:, None] * moved[..., 0] + by_rate[:, None] * moved[..., 1]
             power = power + np.abs(seen) ** 2 * spectrum[:, None]
-        rms = np.sqrt(np.trapezoid(np.abs(closes) ** 2 * power, w, axis=-1))
-        return np.asarray(rms.ravel())
+        return np.asarray(np.abs(closes) ** 2 * power)
 
 
 def draw(problem: Problem, *, seed: int, count: int) -> Scenarios:

@@ -60,7 +60,8 @@ class ArduPlaneLoop:
         error = state[..., 1] + share("FLTE_hz") * (target - s * s * rate - state[..., 1])
         slope = (error - state[..., 1]) / dt
         derivative = state[..., 2] + share("FLTD_hz") * (slope - state[..., 2])
-        integral = state[..., 3] + g["I"] * error * dt
+        limit = self.fixed["integral_rad"]
+        integral = np.clip(state[..., 3] + g["I"] * error * dt, -limit, limit)
         out = g["FF"] * target / s + g["P"] * error + g["D"] * derivative + integral
         return np.stack([target, error, derivative, integral], axis=-1), out / FULL_RAD * self.share
 
@@ -110,6 +111,15 @@ class ArduPlane:
         """INS_GYRO_FILTER."""
         return self.fixed["gyro_filter_hz"]
 
+    @property
+    def slew_limit_per_s(self) -> float:
+        """Of x_RATE_SMAX, beyond which P and D are turned down; 0 is none.
+
+        The limiter sees 45 times P and D in radians (AC_PID.cpp).
+        """
+        limit = self.fixed["slew_degps"] / 45.0
+        return limit / FULL_RAD * self.share if limit > 0.0 else math.inf
+
     def loop(self, gains: Mapping[str, float], airspeed_mps: float) -> ArduPlaneLoop:
         """Return the axis with gains at an airspeed."""
         scaler = speed_scaler(airspeed_mps, self.fixed)
@@ -118,6 +128,8 @@ class ArduPlane:
 
 # What a log says of the parameters that stay, by their names in it.
 LOGGED = {
+    "integral_rad": "{}_RATE_IMAX",
+    "slew_degps": "{}_RATE_SMAX",
     "FLTT_hz": "{}_RATE_FLTT",
     "FLTE_hz": "{}_RATE_FLTE",
     "FLTD_hz": "{}_RATE_FLTD",

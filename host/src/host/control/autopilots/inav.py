@@ -24,6 +24,7 @@ P_DIVISOR, I_DIVISOR, D_DIVISOR, FF_DIVISOR, LEVEL_DIVISOR = 31.0, 4.0, 1905.0, 
 # A filter of two equal lags has its corner where its makers say it with each this much faster.
 PT2_SHARE = 1.0 / math.sqrt(math.sqrt(2.0) - 1.0)
 LOGGED = {
+    "integral_percent": "pid_iterm_limit_percent",
     "gyro_filter_hz": "gyro_main_lpf_hz",
     "dterm_hz": "dterm_lpf_hz",
     "level_filter_hz": "fw_i_level",
@@ -67,7 +68,8 @@ class InavLoop:
         taken = smoothing(f["dterm_hz"] * PT2_SHARE, dt)
         first = state[..., 3] + taken * ((rate_degps - state[..., 2]) / dt - state[..., 3])
         slope = state[..., 4] + taken * (first - state[..., 4])
-        integral = state[..., 1] + g["I"] / I_DIVISOR * error * dt
+        limit = f["integral_percent"] / 100.0 * FULL
+        integral = np.clip(state[..., 1] + g["I"] / I_DIVISOR * error * dt, -limit, limit)
         out = (
             g["P"] / P_DIVISOR * error
             + integral
@@ -112,6 +114,11 @@ class Inav:
     def gyro_filter_hz(self) -> float:
         """gyro_main_lpf_hz; of second order, the slower of its kinds."""
         return self.fixed["gyro_filter_hz"]
+
+    @property
+    def slew_limit_per_s(self) -> float:
+        """None."""
+        return math.inf
 
     def loop(self, gains: Mapping[str, float], airspeed_mps: float) -> InavLoop:
         """Return the axis with gains; no airspeed changes them."""

@@ -11,6 +11,7 @@ behind the gyro's low-pass, whose 4.8 ms make its angles another period older.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -65,6 +66,11 @@ class Mega:
     def gyro_filter_hz(self) -> float:
         """Of the MPU-6000."""
         return self.fixed["gyro_filter_hz"]
+
+    @property
+    def slew_limit_per_s(self) -> float:
+        """None: a card's rate limit is its own."""
+        return math.inf
 
     def loop(self, gains: Mapping[str, float], airspeed_mps: float) -> MegaLoop:
         """Return the axis with gains; no airspeed changes them."""

@@ -7,6 +7,7 @@ is the gyro's, behind a first-order filter (sensors/vehicle_angular_velocity).
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -28,6 +29,10 @@ LOGGED = {
     "loop_hz": "IMU_GYRO_RATEMAX",
 }
 TORQUES = {axis: rf"CA_SV_CS\d+_TRQ_{axis[0].upper()}" for axis in ("roll", "pitch", "yaw")}
+# Of each axis with its default (fw_rate_control_params.c).
+INTEGRAL_LIMITS = {
+    "roll": ("FW_RR_IMAX", 0.2), "pitch": ("FW_PR_IMAX", 0.4), "yaw": ("FW_YR_IMAX", 0.2)
+}  # fmt: skip
 LOWEST_MPS = 0.1  # that the scale divides by
 
 
@@ -74,7 +79,8 @@ class Px4Loop:
         slope = state[..., 2] + taken * ((rate - state[..., 1]) / dt - state[..., 2])
         # The integral of the step before: it is updated behind the output.
         torque = s * s * (g["P"] * error + state[..., 0] - g["D"] * slope) + s * g["FF"] * demand
-        integral = state[..., 0] + g["I"] * error * dt
+        limit = self.fixed["integral_torque"]
+        integral = np.clip(state[..., 0] + g["I"] * error * dt, -limit, limit)
         return np.stack([integral, rate, slope], axis=-1), torque * self.share
 
 
@@ -109,6 +115,11 @@ class Px4:
         """IMU_GYRO_CUTOFF, of second order."""
         return self.fixed["gyro_filter_hz"]
 
+    @property
+    def slew_limit_per_s(self) -> float:
+        """None."""
+        return math.inf
+
     def loop(self, gains: Mapping[str, float], airspeed_mps: float) -> Px4Loop:
         """Return the axis with gains at an airspeed."""
         return Px4Loop(dict(gains), speed_scale(airspeed_mps, self.fixed), self.fixed, self.share)
@@ -126,5 +137,7 @@ def structure(axis: str, logged: Mapping[str, float], trim_mps: float) -> Px4:
     trim_mps : float
         Airspeed of the model.
     """
+    name, usual = INTEGRAL_LIMITS[axis]
     fixed = parameter_table.fixed("px4", LOGGED, logged)
+    fixed["integral_torque"] = logged.get(name, usual)
     return Px4(axis, fixed, share_per_torque(axis, logged), trim_mps)

@@ -12,7 +12,13 @@ from typing import ClassVar
 
 from host.constants import GRAVITY_MPS2
 from host.control.autopilots import parameter_table
-from host.control.autopilots.px4 import LOGGED, Px4Loop, share_per_torque, speed_scale
+from host.control.autopilots.px4 import (
+    INTEGRAL_LIMITS,
+    LOGGED,
+    Px4Loop,
+    share_per_torque,
+    speed_scale,
+)
 from host.control.autopilots.structure import Setting
 
 
@@ -63,5 +69,7 @@ def structure(logged: Mapping[str, float], trim_mps: float) -> Px4Yaw:
     """
     names = {**LOGGED, "yaw_integral": "FW_YR_I"}
     fixed = parameter_table.fixed("px4", names, logged)
+    name, usual = INTEGRAL_LIMITS["yaw"]
+    fixed["integral_torque"] = logged.get(name, usual)
     shares = share_per_torque("yaw", logged), share_per_torque("roll", logged)
     return Px4Yaw(fixed, *shares, trim_mps)

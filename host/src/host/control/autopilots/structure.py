@@ -10,6 +10,8 @@ import numpy as np
 
 from host.arrays import Array
 
+SMALL = 2.0**-20  # a power of two: nothing is rounded
+
 
 @dataclass(frozen=True, slots=True)
 class Setting:
@@ -51,7 +53,7 @@ class Loop(Protocol):
         """Numbers that it keeps between two steps."""
 
     def step(self, state: Array, angle_error: Array, rate: Array) -> tuple[Array, Array]:
-        """Return the new state and the output; linear, without limits.
+        """Return the new state and the output; of limits only the integral's.
 
         Parameters
         ----------
@@ -93,6 +95,10 @@ class Structure(Protocol):
     def gyro_filter_hz(self) -> float:
         """Corner of the second-order low-pass before the loop."""
 
+    @property
+    def slew_limit_per_s(self) -> float:
+        """Rate of the output, in shares of travel, beyond which gains are taken back."""
+
     def loop(self, gains: Mapping[str, float], airspeed_mps: float) -> Loop:
         """Return the loop with gains by their role, at an airspeed."""
 
@@ -121,12 +127,12 @@ class YawStructure(Protocol):
 def state_space(loop: Loop) -> tuple[Array, Array, Array, Array]:
     """Return A, B, C, D of a loop from measured angle and rate to its output.
 
-    The difference equation itself is asked, with unit states and inputs: what is analysed is what
-    flies.
+    The difference equation itself is asked, with states and inputs far below its limits: what is
+    analysed is what flies.
     """
     n = loop.states
-    state = np.vstack([np.eye(n), np.zeros((2, n))])
-    angle = np.r_[np.zeros(n), 1.0, 0.0]
-    rate = np.r_[np.zeros(n), 0.0, 1.0]
-    new, out = loop.step(state, -angle, rate)
+    state = SMALL * np.vstack([np.eye(n), np.zeros((2, n))])
+    angle = SMALL * np.r_[np.zeros(n), 1.0, 0.0]
+    rate = SMALL * np.r_[np.zeros(n), 0.0, 1.0]
+    new, out = (one / SMALL for one in loop.step(state, -angle, rate))
     return new[:n].T, new[n:].T, out[None, :n], out[None, n:]
