@@ -31,7 +31,7 @@ from host.sysid.models.templates import TEMPLATES, Trim, template
 from host.sysid.models.uncertainty import Uncertainty
 from host.sysid.numerics.model_problems import output_problem
 from host.sysid.numerics.output_error_problem import OutputProblem
-from host.sysid.reconstruction.flight_path import AIR, PITOT
+from host.sysid.reconstruction.flight_path import PITOT
 from host.sysid.reconstruction.reconstruction import Compatibility
 from host.sysid.reconstruction.sensor_corrections import (
     INSTANTANEOUS_ERRORS,
@@ -39,15 +39,9 @@ from host.sysid.reconstruction.sensor_corrections import (
     pressure_share,
     residual_deviations,
 )
-from host.sysid.reconstruction.sensor_dynamics import (
-    ANGLES,
-    advance_in_time,
-    perturb_columns,
-    residual_errors,
-)
+from host.sysid.reconstruction.sensor_dynamics import perturb_columns, residual_errors
 
 RECONSTRUCTED = "reconstruction of this flight"  # that left less of an error than files state
-VANE_PLACE = "vane_x_m"
 # Of the dynamic pressure, most that a pitot's zero is moved by at once: one that nobody zeroed is
 # off by more than all of it, and no airspeed would be left. A larger one counts in proportion.
 MOST_PRESSURE = 0.2
@@ -61,8 +55,6 @@ def systematic_error_shifts(
     cuts: Sequence[Mapping[str, Array]],
     known: Sequence[Compatibility],
     trim: Trim,
-    *,
-    late_vanes: bool = False,
 ) -> tuple[ShiftedEstimate, ...]:
     """Return the shift of the estimate for one standard deviation of each uncorrected sensor error.
 
@@ -78,8 +70,6 @@ def systematic_error_shifts(
         Of the flight of each maneuver. An error is one of all flights, in each of them by its own
         deviation there: what is new at every power-on counts as if it were not.
     trim : Trim
-    late_vanes : bool
-        Whether a delay of the vanes was estimated: it has taken up what of their place looks alike.
 
     Returns
     -------
@@ -90,7 +80,7 @@ def systematic_error_shifts(
     if one_step is None:
         return ()
     shifted = []
-    for one in _without_each(result.model, maneuvers, cuts, known, trim, late_vanes=late_vanes):
+    for one in _without_each(result.model, maneuvers, cuts, known, trim):
         estimate = result.estimate
         if not one.same(result.model, maneuvers):
             change = one_step.change(one.model, one.trim, one.maneuvers)
@@ -180,8 +170,6 @@ def _without_each(
     cuts: Sequence[Mapping[str, Array]],
     known: Sequence[Compatibility],
     trim: Trim,
-    *,
-    late_vanes: bool = False,
 ) -> Iterator[_WithoutOne]:
     """Yield the data, and through the trim the model, without each uncorrected error."""
     still = _mean_of(cuts)
@@ -197,7 +185,7 @@ def _without_each(
             most = MOST_PRESSURE * max(still[1].qbar_pa, 1.0)
             part = min(1.0, most / max(s.get(error, 0.0) for s in sizes.values()))
         other = [
-            _without_one(cut, error, part * sizes[id(c)].get(error, 0.0), c, late_vanes=late_vanes)
+            _without_one(cut, error, part * sizes[id(c)].get(error, 0.0), c)
             for cut, c in zip(cuts, known, strict=True)
         ]
         changed = [_changed(model, m, c, o) for m, c, o in zip(maneuvers, cuts, other, strict=True)]
@@ -233,21 +221,11 @@ def _without_one(
     error: str,
     deviation: float,
     known: Compatibility,
-    *,
-    late_vanes: bool,
 ) -> dict[str, Array]:
-    """Return columns with one standard deviation of an error removed.
-
-    A vane ahead of the CG by x lags by x/V, but for what the angle does beside turning with the
-    aircraft. A delay that was estimated has taken that up.
-    """
+    """Return columns with one standard deviation of an error removed."""
     if error in INSTANTANEOUS_ERRORS:
         return correct_columns(columns, {error: deviation}, pressure_share(known))
-    found = perturb_columns(columns, error, deviation, known)
-    if error == VANE_PLACE and late_vanes and AIR[0] in columns:
-        lag_s = deviation / float(np.median(columns[AIR[0]]))
-        return advance_in_time(found, ANGLES, -lag_s)
-    return found
+    return perturb_columns(columns, error, deviation, known)
 
 
 def add_systematic_covariance(result: FitResult, moved: Sequence[ShiftedEstimate]) -> Uncertainty:

@@ -36,7 +36,6 @@ from host.sysid.linear.linear_stages import LinearEstimate, LinearIntervals
 from host.sysid.maneuvers.pilot_takeover import taken_over
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.models.uncertainty import Uncertainty
 from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
 from host.sysid.numerics.maneuver_agreement import disagreement, maneuver_agreement
@@ -49,7 +48,6 @@ from host.sysid.validation.free_simulation import FreeResponses, free_responses
 from host.sysid.validation.noise_model_limits import excess_over_noise_model
 
 LEAST_COMMANDED = 0.25  # of all samples, in maneuvers that a test input made
-VANES_DELAY = STANDARD_DELAYS[0].name
 WHITE = "output error (white)"  # its noise is judged beside what the inputs drive
 
 
@@ -251,10 +249,7 @@ def _by_sensors(
     estimated |= DELAYED_COLUMNS.keys() if e.found.delays else set()
     # Without a file the airspeed's error is one, of which the data tell a part: `_by_airspeed`.
     estimated |= {*PITOT, DENSITY} if e.columns.airframe is None and e.trim.known else set()
-    late = e.columns.airframe is None and VANES_DELAY in e.found.delays
-    moved = systematic_error_shifts(
-        statistical, fitted, e.columns.cuts, known, e.trim, late_vanes=late
-    )
+    moved = systematic_error_shifts(statistical, fitted, e.columns.cuts, known, e.trim)
     return tuple(s for s in moved if s.error not in estimated)
 
 
