@@ -1,11 +1,15 @@
 """A file that claims too little is doubted, an honest one as rarely as stated."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from host.aircraft.mass_properties import airframe_data
 from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
 from host.sysid.checks import calibration_findings
+from host.sysid.pipeline import aircraft_data, at_hand
+from host.sysid.pipeline.flight_preparation import prepare
 from host.sysid.reconstruction import prior
 from host.sysid.reconstruction.calibration_consistency import (
     OBSERVABLE_GROUPS,
@@ -13,6 +17,7 @@ from host.sysid.reconstruction.calibration_consistency import (
     ConsistencyTest,
     calibration_lines,
     consistency_tests,
+    widened_to_flight,
 )
 from host.sysid.reconstruction.reconstruction import (
     Compatibility,
@@ -78,8 +83,8 @@ def test_without_gps_what_looks_like_a_tilt_of_the_imu_doubts_no_file() -> None:
     assert "calibration" not in {finding.check for finding in answer.findings}
 
 
-def test_where_no_error_alone_is_too_large_it_may_be_any() -> None:
-    """With an airspeed 10 % high all were 2.1 times their file, and no column was in doubt."""
+def test_where_no_error_alone_is_too_large_all_count_as_large() -> None:
+    """With an airspeed 10 % high all were 2.1 times their file."""
     every = ConsistencyTest("all", 2.1, 17, SIGNIFICANCE / 10.0)
     agreement = Compatibility((), {}, (), True, calibration_tests=(
         every,
@@ -88,7 +93,27 @@ def test_where_no_error_alone_is_too_large_it_may_be_any() -> None:
     ))  # fmt: skip
     [finding] = calibration_findings(agreement)
     assert "all errors together 2.1 times" in finding.text
-    assert {"airspeed_mps", "alpha_rad", "az_mps2", "q_radps"} <= set(finding.channels)
+    assert finding.channels == ()
+    stated = sensor_error_model(NAME)
+    wider = widened_to_flight(stated, agreement.calibration_tests).errors
+    for name in OBSERVABLE_GROUPS:
+        assert wider[name].sigmas == pytest.approx([2.1 * s for s in stated.errors[name].sigmas])
+    assert wider["density_share"] == stated.errors["density_share"]
+
+
+def test_an_error_that_a_flight_shows_counts_that_large_and_forbids_nothing() -> None:
+    """A file claims a fifth of the errors. Without a file nobody claimed anything."""
+    _, columns = flown("demo", 901)
+    known, zeros = aircraft_data(NAME), "gyro_bias_radps"
+    claimed = [name for name in OBSERVABLE_GROUPS if not name.startswith("pitot")]
+    bold = replace(known, instrument=known.instrument.scaled(0.2, *claimed))
+    shown, without_file = prepare(at_hand(columns, aircraft=bold)), prepare(at_hand(columns))
+    assert [(f.check, f.channels) for f in shown.findings] == [("calibration", ())]
+    counted = shown.flight.instrument
+    assert counted is not None
+    ratio = counted.errors[zeros].sigma("x") / bold.instrument.errors[zeros].sigma("x")
+    assert 4.0 < ratio < 8.0
+    assert not without_file.findings
 
 
 def test_a_recorded_flight_doubts_a_file_that_claims_a_fifth_and_no_honest_one() -> None:

@@ -13,7 +13,7 @@ from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, unknown_sensors
 from host.instrument.recording_notes import recording_notes
 from host.instrument.servo_prior import servo_prior
-from host.physical.calibration import load_calibration
+from host.physical.calibration import Calibration, load_calibration
 from host.sysid.aerodynamics.measured_thrust import with_thrust
 from host.sysid.checks.agreement_findings import calibration_findings
 from host.sysid.checks.airspeed_scale import airspeed_scale_findings
@@ -29,6 +29,7 @@ from host.sysid.maneuvers.maneuver_selection import overlap_notes, select_maneuv
 from host.sysid.pipeline.flight_at_hand import FlightAtHand
 from host.sysid.pipeline.known_aircraft import AircraftData
 from host.sysid.pipeline.surface_travel import with_surface_angles
+from host.sysid.reconstruction.calibration_consistency import inconsistent_groups, widened_to_flight
 from host.sysid.reconstruction.ground_attitude import update_by_standstill
 from host.sysid.reconstruction.reconstruction import (
     Compatibility,
@@ -60,8 +61,12 @@ class PreparedFlight:
 
 @dataclass(frozen=True, slots=True)
 class _Agreement:
-    """Reconstruction of a flight, or what calibration alone leaves open of its sensors."""
+    """Reconstruction of a flight, or what calibration alone leaves open of its sensors.
 
+    `sensors` are as wrong as the flight shows, where a file claims less.
+    """
+
+    sensors: SensorErrorModel
     found: Compatibility | None = None
     by_calibration: Compatibility | None = None
     findings: tuple[Finding, ...] = ()
@@ -88,6 +93,8 @@ def prepare(given: FlightAtHand) -> PreparedFlight:
     # A law is seen in commands: a servo moves the surface later and slower.
     fed_back = feedback_findings({**columns, **commands}, found)
     agreed = _agreement(given, columns, instrument, sensors)
+    sensors = agreed.sensors
+    instrument = sensors if known else None
     told = agreed.found if how.corrections else None
     unplaced = sensors.recorded(read.recording)
     by_default = None if known else by_calibration_alone(unplaced, told)
@@ -140,10 +147,14 @@ def prepare(given: FlightAtHand) -> PreparedFlight:
 
 def _sensors(given: FlightAtHand, instrument: SensorErrorModel | None) -> SensorErrorModel:
     """Return the instrument of a flight, or what is usual of its maker's; what is known better."""
-    calibration = given.how.calibration
-    known = load_calibration(calibration) if calibration is not None else given.read.calibration
-    sensors = instrument or unknown_sensors(given.read.recording, known)
+    sensors = instrument or unknown_sensors(given.read.recording, _calibration(given))
     return sensors if given.errors is None else replace(sensors, errors=given.errors)
+
+
+def _calibration(given: FlightAtHand) -> Calibration | None:
+    """Return the calibration that a user gave, else the one that made the columns."""
+    calibration = given.how.calibration
+    return load_calibration(calibration) if calibration is not None else given.read.calibration
 
 
 def _maneuvers(
@@ -167,19 +178,29 @@ def _agreement(
 ) -> _Agreement:
     """Compare the sensors of a flight with each other."""
     known, how = given.known, given.how
+    airframe = known.airframe if known else None
     notes: tuple[str, ...] = ()
+    findings: list[Finding] = []
     try:
-        found = reconstruct(columns, known.airframe if known else None, instrument, sensors)
+        found = reconstruct(columns, airframe, instrument, sensors)
+        # What is usual of sensors that nobody calibrated is no claim.
+        claims = instrument, _calibration(given), given.errors
+        if any(c is not None for c in claims) and inconsistent_groups(found.calibration_tests):
+            tests, findings = found.calibration_tests, calibration_findings(found)
+            sensors = widened_to_flight(sensors, tests)
+            instrument = sensors if known else None
+            found = reconstruct(columns, airframe, instrument, sensors)
+            found = replace(found, calibration_tests=tests)
     except NoAgreementError as error:
         alone = by_calibration_alone(instrument) if instrument and how.corrections else None
-        return _Agreement(by_calibration=alone, unchecked=(str(error),))
+        return _Agreement(sensors, None, alone, tuple(findings), unchecked=(str(error),))
     except IdentificationError as error:
         unknown = (no_instrument_errors_finding(columns),) if given.read.shares else ()
-        return _Agreement(findings=unknown, unchecked=(str(error),))
+        return _Agreement(sensors, findings=unknown, unchecked=(str(error),))
     found = found if how.delays else without_estimated_delays(found)
     if known is not None:
         found, notes = update_by_standstill(found, columns, known.airframe)
-    return _Agreement(found, None, tuple(calibration_findings(found)), notes)
+    return _Agreement(sensors, found, None, tuple(findings), notes)
 
 
 def _hidden_angles(

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import special
 
 from host.arrays import Array
+from host.instrument.deviations import SensorErrorModel
 from host.sysid.reconstruction.flight_path import FLOW, INERTIAL, PITOT, PLACES
 
 # Groups of errors that kinematics can observe, by their names in the file, and their unknowns.
@@ -111,6 +112,19 @@ def inconsistent_groups(found: Sequence[ConsistencyTest]) -> list[ConsistencyTes
     return [c for c in found[1:] if c.rejected] or list(found[:1])
 
 
+def widened_to_flight(
+    instrument: SensorErrorModel, found: Sequence[ConsistencyTest]
+) -> SensorErrorModel:
+    """Return an instrument whose errors are as large as a flight shows, where that is more.
+
+    The ratio of Birge (Phys. Rev. 40, 1932, p. 207): deviations times what the residuals ask for.
+    """
+    for group in inconsistent_groups(found):
+        names = OBSERVABLE_GROUPS if group.name == ALL else (group.name,)
+        instrument = instrument.scaled(group.rms_ratio, *names)
+    return instrument
+
+
 def calibration_lines(found: Sequence[ConsistencyTest]) -> list[str]:
     """Return the verdict's lines on a file that states too little; none if it is consistent."""
     worst = inconsistent_groups(found)
@@ -118,8 +132,8 @@ def calibration_lines(found: Sequence[ConsistencyTest]) -> list[str]:
         return []
     parts = ", ".join(f"{_in_words(c.name)} {c.rms_ratio:.1f} times" for c in worst)
     return [
-        f"the calibration claims less than this flight shows: {parts}; intervals are too narrow:"
-        " calibrate again, or state larger deviations"
+        f"the calibration claims less than this flight shows: {parts}; calibrate again, or state"
+        " larger deviations"
     ]
 
 
