@@ -124,22 +124,12 @@ class CoefficientView:
 
     def further_lines(self, findings: Sequence[Finding]) -> list[str]:
         """Return the lines on maneuvers that do not agree, and on prediction."""
-        late = self.answer.lagging
-        return [
-            *(
-                [f"  surfaces seem to lag behind their columns: {', '.join(late)} widened to it"]
-                if late
-                else []
-            ),
-            *_agreement_lines(self.answer),
-            _prediction_line(self.answer),
-        ]
+        return [*_agreement_lines(self.answer), _prediction_line(self.answer)]
 
 
 def lag_beside(view: CoefficientView, evidence: Evidence) -> list[Doubt]:
-    """Doubt moments of surfaces that seem to lag: to first order the interval holds too little."""
-    late = {name.partition("_")[0] for name in view.answer.lagging}
-    names = [n for n in view.names if n.partition("_")[0] in late]
+    """Doubt moments of surfaces that seem to lag: no interval holds what that does."""
+    names = [n for n in view.names if n.partition("_")[0] in view.answer.lagging]
     return doubt(names, view.names, "surfaces seem to lag behind their columns")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,7 +36,7 @@ from host.sysid.coefficients.coefficient_modes import (
 from host.sysid.coefficients.coefficient_search import search_coefficients
 from host.sysid.coefficients.deletion_diagnostics import CrossValidation
 from host.sysid.coefficients.flight_terms import flight_terms
-from host.sysid.coefficients.hidden_lag import lag_shifts, widened_by
+from host.sysid.coefficients.hidden_lag import lagging_moments
 from host.sysid.coefficients.pooled_flights import pool_fits
 from host.sysid.coefficients.window_spectra import SHORTEST_S, ResidualSpectra, Window
 from host.sysid.flight.reconstructed_flight import (
@@ -77,9 +77,8 @@ class CoefficientAnswer:
         Residual delay (s) and 95 % half-width.
     remarks : tuple of str
         What was left out or assumed, because the flights lack what would tell it.
-    lagging : dict
-        Coefficients of moments that a lag of surfaces seems to move, and how far: their intervals
-        hold it.
+    lagging : tuple of str
+        Moments that a lag of surfaces seems to move by more than an interval.
     """
 
     model: CoefficientModel
@@ -92,7 +91,7 @@ class CoefficientAnswer:
     systems: dict[str, LinearSystem]
     delays: dict[str, tuple[float, float]]
     remarks: tuple[str, ...] = ()
-    lagging: dict[str, float] = field(default_factory=dict)
+    lagging: tuple[str, ...] = ()
 
     @property
     def template(self) -> str:
@@ -196,8 +195,6 @@ class CoefficientEstimator:
             for one, width, prediction in zip(estimate, widths, predicted, strict=True)
         ]
         fit = pool_fits(fits)
-        lagging = lag_shifts([one.search for one in estimate], fit.derivatives)
-        fit = widened_by(fit, lagging)
         return CoefficientAnswer(
             model=self.model,
             fit=fit,
@@ -209,7 +206,7 @@ class CoefficientEstimator:
             systems=linear_systems(fit, self.airframe),
             delays=_delays(fit, self.instrument),
             remarks=tuple(dict.fromkeys(r for one in estimate for r in one.remarks)),
-            lagging=lagging,
+            lagging=lagging_moments([one.search for one in estimate], fit.derivatives),
         )
 
     def _of_one(self, flight: ReconstructedFlight) -> CoefficientEstimate:
