@@ -54,6 +54,8 @@ class ReportParts:
         As it can be pasted.
     sheet : (str, list of str) or None
         Heading and lines of the preflight sheet.
+    gains : str
+        Markup of gains for an autopilot; empty where none were asked for.
     """
 
     found: Identification
@@ -65,6 +67,7 @@ class ReportParts:
     sheet: tuple[str, list[str]] | None = None
     calibrations: dict[str, str] = field(default_factory=dict)
     beside: Identification | None = None
+    gains: str = ""
 
 
 def report_page(parts: ReportParts) -> str:
@@ -104,6 +107,7 @@ def report_page(parts: ReportParts) -> str:
           for at, label in enumerate(called)),
         _section("Methods side by side", _methods(numbers, beside)),
         _section("Modes", mode_table(numbers, called, titles) + _pictures(figures, poles)),
+        _section("Gains", parts.gains),
         _section("What to fly next", items(found.summary.fly_lines())),
         _section("What to measure on the ground", items(found.summary.measure_lines())),
         _appendix(parts, {"result": text} | ({_BESIDE: others} if others else {})),

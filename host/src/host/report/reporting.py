@@ -17,6 +17,7 @@ from host.readers.flight_choice import file_and_flight
 from host.readers.foreign_tables import TEXT_KINDS
 from host.readers.readable_file import readable_file
 from host.report.flight_reading import TABLES, FlightRequest, read_flight
+from host.report.gains_section import check_gains, gains_section
 from host.report.plotting import page_file, write_text
 from host.report.provenance import hashes, versions
 from host.report.report_page import ReportParts, report_page
@@ -43,6 +44,8 @@ class ReportRequest:
         Further arguments of `host.identify`.
     files : list of Path
         Further input files (aircraft, prior), for the appendix.
+    tune : str or None
+        Autopilot to find gains for.
     """
 
     sources: list[Path]
@@ -52,6 +55,7 @@ class ReportRequest:
     output: Path | None = None
     preflight: Path | None = None
     files: list[Path] = field(default_factory=list)
+    tune: str | None = None
 
 
 def write_report(request: ReportRequest) -> tuple[Path, Identification]:
@@ -62,6 +66,9 @@ def write_report(request: ReportRequest) -> tuple[Path, Identification]:
     HostError
         As `host.identify`; UsageError if the place cannot be written to.
     """
+    aircraft = request.options.get("aircraft")
+    if request.tune:
+        check_gains(request.tune, aircraft)
     files = list(dict.fromkeys(file_and_flight(one)[0] for one in request.sources))
     first = files[0]
     target = page_file(request.output, first if first.suffix else first / "flight", ".report.html")
@@ -85,12 +92,13 @@ def write_report(request: ReportRequest) -> tuple[Path, Identification]:
         found=found,
         beside=beside,
         flights=flights,
-        aircraft=str(request.options.get("aircraft") or ""),
+        aircraft=str(aircraft or ""),
         versions=versions(),
         hashes=hashes([*files, *sorted(calibrations), *others]),
         command=request.command,
         sheet=sheet,
         calibrations=hashes(sorted(calibrations)),
+        gains=gains_section(found, request.tune, str(aircraft), first) if request.tune else "",
     )
     write_text(target, report_page(parts))
     return target, found

@@ -90,6 +90,8 @@ def _add_answer_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="truth of a simulated flight; of several flights one each",
     )
+    parser.add_argument("--tune", metavar="NAME",
+                        help="find gains too, as `host tune --for NAME` does")  # fmt: skip
     add_row_rate(parser)
     add_sensor(parser)
     add_flight(parser, every=True)
@@ -141,6 +143,7 @@ def run(args: argparse.Namespace) -> int:
         output=args.output,
         preflight=args.preflight,
         files=files,
+        tune=args.tune,
     )
     try:
         target, found = write_report(request)
