@@ -1,10 +1,12 @@
-"""Fly and identify the flight of host/IDENTIFY.md, and make that page's pictures anew.
+"""Fly and identify the flight of host/IDENTIFY.md, and write its answer and pictures anew.
 
-cd host && python -m studies.first_flight
+cd host && python -m studies.first_flight            # --check: is the page the answer of today?
 """
 
 from __future__ import annotations
 
+import contextlib
+import io
 import re
 import sys
 import tempfile
@@ -12,31 +14,65 @@ from pathlib import Path
 
 from host.cli import main as host
 
-PICTURES = Path(__file__).resolve().parents[1] / "pictures"
+HOST = Path(__file__).resolve().parents[1]
+PAGE = HOST / "IDENTIFY.md"
+PICTURES = HOST / "pictures"
 SHOWN = ("longitudinal_fit.svg", "longitudinal_intervals.svg")
 DIGITS = re.compile(r"(\d+\.\d\d)\d+")  # a hundredth of a point is nothing to see
+ANSWER = re.compile(r"(?<=```\n)Known from this flight.*?(?=```\n)", re.DOTALL)
+STALE = 6
 
 
-def main() -> int:
-    """Run the page's commands in a folder of their own; keep the pictures it shows."""
-    with tempfile.TemporaryDirectory() as name:
-        flight = Path(name, "flight")
-        code = host(["simulate", "demo", "-o", str(flight)])
-        if code == 0:
-            code = host([
-                "identify", str(flight / "flight.bin"),
-                "--calibration", str(flight / "calibration.toml"),
-                "--aircraft", "ultrastick25e", "--plots", str(flight / "pictures"),
-            ])  # fmt: skip
+def flown_answer(folder: Path) -> str:
+    """Run the page's commands in a folder and return what `host identify` prints.
+
+    Raises
+    ------
+    RuntimeError
+        A command of the page failed; its line stands on stderr.
+    """
+    flight = folder / "flight"
+    flown = [
+        "identify", str(flight / "flight.bin"),
+        "--calibration", str(flight / "calibration.toml"),
+        "--aircraft", "ultrastick25e", "--plots", str(flight / "pictures"),
+    ]  # fmt: skip
+    printed = io.StringIO()
+    for words in (["simulate", "demo", "-o", str(flight)], flown):
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
+            code = host(words)
         if code:
-            return code
+            raise RuntimeError(f"host {words[0]} ended with {code}")
+    return printed.getvalue()
+
+
+def page_with(answer: str, page: str) -> str:
+    """Return the page with this answer in place of the one that it shows."""
+    text, count = ANSWER.subn(lambda _: answer.rstrip("\n") + "\n", page)
+    if count != 1:
+        raise ValueError(f"{PAGE.name} shows {count} answers, expected 1")
+    return text
+
+
+def main(words: list[str]) -> int:
+    """Write page and pictures, or with `--check` compare the page; 6 where it is stale."""
+    page = PAGE.read_text(encoding="utf-8")
+    with tempfile.TemporaryDirectory() as name:
+        answer = flown_answer(Path(name))
+        if "--check" in words:
+            stale = page_with(answer, page) != page
+            if stale:
+                sys.stderr.write(f"{PAGE.name} shows another answer: run studies.first_flight\n")
+            return STALE if stale else 0
         PICTURES.mkdir(exist_ok=True)
         for picture in SHOWN:
-            text = (flight / "pictures" / picture).read_text(encoding="utf-8")
+            text = Path(name, "flight", "pictures", picture).read_text(encoding="utf-8")
             (PICTURES / picture).write_text(DIGITS.sub(r"\1", text), encoding="utf-8")
-    sys.stderr.write(f"wrote {len(SHOWN)} pictures in {PICTURES}\n")
+    PAGE.write_text(page_with(answer, page), encoding="utf-8")
+    sys.stderr.write(f"wrote {PAGE.name} and {len(SHOWN)} pictures in {PICTURES}\n")
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,20 @@
+"""The answer that host/IDENTIFY.md shows is the one that its commands give today."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from studies import first_flight
+
+
+def test_page_shows_todays_answer(tmp_path: Path) -> None:
+    page = first_flight.PAGE.read_text(encoding="utf-8")
+    assert first_flight.page_with(first_flight.flown_answer(tmp_path), page) == page
+
+
+def test_a_stale_answer_is_seen() -> None:
+    page = first_flight.PAGE.read_text(encoding="utf-8")
+    assert first_flight.page_with("Known from this flight: pitch not.\n", page) != page
+    with pytest.raises(ValueError, match="shows 0 answers"):
+        first_flight.page_with("", "# A page without one")
