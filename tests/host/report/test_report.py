@@ -96,7 +96,7 @@ def test_numbers_of_the_report_are_those_of_json_and_nothing_planted_runs(
     assert any("/parameters/M_alpha/value" in pointer for pointer, _, _ in numbers.found)
     (inside,) = re.findall(r'href="data:application/json;base64,([^"]+)"', text)
     assert json.loads(base64.b64decode(inside)) == said
-    for word in ("GO 2026-11-23", "M_alpha", "short period", "SHA-256", "Verdict", "unseen"):
+    for word in ("GO 2026-11-23", "M_alpha", "short period", "SHA-256", "Answer", "unseen"):
         assert word in text
     assert "<img src=x" not in text and "</script><b>" not in text and "\x01" not in text
     page = browser.open(target.as_uri())
@@ -109,7 +109,19 @@ def test_numbers_of_the_report_are_those_of_json_and_nothing_planted_runs(
     broken = "[...document.images].filter((one) => !one.naturalWidth).length"
     assert page.evaluate(broken) == 0 and page.evaluate("document.images.length") >= 3
     printed = page.call("Page.printToPDF", printBackground=True)["data"]
-    assert base64.b64decode(printed).startswith(b"%PDF")
+    pdf = base64.b64decode(printed)
+    assert pdf.startswith(b"%PDF")
+    assert 1 <= len(re.findall(rb"/Type\s*/Page[^s]", pdf)) <= 3  # six with ten test points
+
+
+def test_a_report_of_before_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    doublets().to_csv("flight.csv", index=False)
+    for _ in range(2):
+        assert main(["report", "flight.csv", *ASKED]) == 0
+    assert sorted(p.name for p in tmp_path.glob("*.html")) == [
+        "flight-2.report.html", "flight.report.html"
+    ]  # fmt: skip
 
 
 def test_a_second_method_and_what_the_aircraft_file_says_stand_beside(

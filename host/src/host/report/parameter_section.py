@@ -8,7 +8,7 @@ from host.report.html_table import table
 from host.report.html_text import escaped
 from host.report.json_numbers import JsonNumbers
 
-_CLASS = {
+CLASSES = {
     "trust": "good", "use with care": "fair", "do not rely on": "poor", "do not use": "poor",
 }  # fmt: skip
 # Shown where no single cause makes a quarter of the variance.
@@ -101,7 +101,7 @@ def _prior_of(numbers: JsonNumbers, answer: dict[str, object]) -> str:
 
 
 def _mark(mark: str) -> str:
-    return f'<span class="{_CLASS.get(mark, "")} mark">{escaped(mark)}</span>' if mark else ""
+    return f'<span class="{CLASSES.get(mark, "")} mark">{escaped(mark)}</span>' if mark else ""
 
 
 def _without_empty(heads: list[str], rows: list[list[str]], words: tuple[int, ...]) -> str:

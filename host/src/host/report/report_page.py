@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from host.report.answer_section import answer_section
 from host.report.embedded_picture import picture
 from host.report.fit_section import fit_table, mode_table
 from host.report.flight_page import page_text
 from host.report.flight_sections import (
     calibration_and_preflight,
     data_health,
+    escaped_lines,
     maneuver_cards,
     sensor_agreement,
 )
@@ -26,13 +28,11 @@ from host.report.parameter_section import method_comparison, parameter_tables
 from host.report.shown_flight import ShownFlight, is_simulated
 from host.report.strip_figure import overview_figure
 from host.report.track_figure import track_figure
-from host.sysid.answer import MARKS
 from host.sysid.answer.mat_file import labels
 
 if TYPE_CHECKING:
     from host.sysid.pipeline import Identification
 
-_TRUST, _CARE, _SMALL, _NOT, _NEVER = MARKS
 _BESIDE = "beside"  # file of the second method's numbers in the page
 
 
@@ -96,21 +96,44 @@ def report_page(parts: ReportParts) -> str:
         f"<h1>Identification of {escaped(parts.aircraft or 'an aircraft without a file')}</h1>",
         f'<p class="facts">{escaped(", ".join(sources))}</p>',
         _simulated(parts),
-        _verdict_box(found, numbers),
-        _section("Data health", data_health(parts.flights, sources) + _findings(found)),
-        _section("Calibration and preflight",
-                 calibration_and_preflight(parts.flights, parts.calibrations, parts.sheet)),
-        _section("Flight", _overview(parts.flights)),
-        _section("Maneuvers", cards + _pictures(figures, inputs)),
-        _section("Sensor agreement", sensor_agreement(numbers)),
-        *(_answer(found, figures, numbers, at, label, titles[at])
-          for at, label in enumerate(called)),
-        _section("Methods side by side", _methods(numbers, beside)),
-        _section("Modes", mode_table(numbers, called, titles) + _pictures(figures, poles)),
+        _data_lines(parts.flights),
+        f'<div class="answer"><h2>Answer</h2>{answer_section(found.summary)}</div>',
+        '<div class="pair">'
+        + _section("What to fly next", items(found.summary.fly_lines()))
+        + _section("What to measure on the ground", items(found.summary.measure_lines()))
+        + "</div>",
+        _findings(found),
+        _section("Measured and model", _pair(
+            _fit_picture(found, figures, at, label, titles[at]) for at, label in enumerate(called)
+        )),
+        _section("Estimates", "".join(
+            _estimates(found, numbers, at, label, titles[at]) for at, label in enumerate(called)
+        )),
+        _section("Modes", mode_table(numbers, called, titles)),
         _section("Gains", parts.gains),
-        _section("What to fly next", items(found.summary.fly_lines())),
-        _section("What to measure on the ground", items(found.summary.measure_lines())),
-        _appendix(parts, {"result": text} | ({_BESIDE: others} if others else {})),
+        _section("Flight", _overview(parts.flights) + cards),
+        '<section class="behind"><h2>Behind the answer</h2>',
+        _folded("Every reason of every mark", _reasons(found)),
+        _folded("Intervals and poles", _pair(
+            [_pictures(figures, {f"{label}_intervals": f"{title}: 95 % intervals"})
+             for label, title in zip(called, titles, strict=True)] + [_pictures(figures, poles)]
+        )),
+        _folded("Frequency responses", "".join(
+            _pictures(figures, {f"{label}_bode": f"{title}: frequency responses"})
+            for label, title in zip(called, titles, strict=True)
+        )),
+        _folded("Errors of prediction", "".join(
+            f"<h4>{escaped(titles[at])}</h4>{fit_table(numbers, at)}" for at in range(len(called))
+        )),
+        _folded("Spectra of the inputs", _pictures(figures, inputs)),
+        _folded("Methods side by side", _methods(numbers, beside)),
+        _folded("Sensor agreement", sensor_agreement(numbers)),
+        _folded("Data health", data_health(parts.flights, sources)),
+        _folded("Calibration and preflight",
+                calibration_and_preflight(parts.flights, parts.calibrations, parts.sheet)),
+        _folded("Command, versions, files",
+                _appendix(parts, {"result": text} | ({_BESIDE: others} if others else {}))),
+        "</section>",
     ]  # fmt: skip
     return HtmlPage(
         title=f"Identification: {parts.aircraft or sources[0]}",
@@ -153,27 +176,30 @@ def _methods(numbers: JsonNumbers, beside: list[JsonNumbers]) -> str:
     )
 
 
-def _verdict_box(found: Identification, numbers: JsonNumbers) -> str:
-    rows = []
-    for answer in numbers.document["answers"]:
-        by: dict[str, list[str]] = {_TRUST: [], _CARE: [], _SMALL: [], _NOT: []}
-        for name, own in answer["marks"].items():
-            by[_NOT if own["mark"] == _NEVER else own["mark"]].append(name)
-        rows.append([
-            escaped(f"{answer['template']}, {answer['method']}"),
-            *(f'<span class="{kind}">{escaped(", ".join(by[mark]) or "none")}</span>'
-              for mark, kind in ((_TRUST, "good"), (_CARE, "fair"), (_NOT, "poor"), (_SMALL, ""))),
-        ])  # fmt: skip
-    heads = ["model", "good (within 10 %)", "fair", "not known",
-             "tiny: under 5 % of its equation"]  # fmt: skip
-    if all(row[-1].endswith(">none</span>") for row in rows):
-        heads, rows = heads[:-1], [row[:-1] for row in rows]
-    short = "\n".join(map(escaped, found.summary_lines()))
-    lines = "\n".join(map(escaped, (*found.verdict, *found.opinion_lines)))
-    return (
-        f'<div class="verdict"><h2>Verdict</h2><pre>{short}</pre>{table(heads, rows, range(5))}'
-        f"<details><summary>every reason</summary><pre>{lines}</pre></details></div>"
-    )
+def _folded(title: str, content: str) -> str:
+    """Return what is looked at on demand: closed on the screen, and not printed unless opened."""
+    if not content:
+        return ""
+    return f"<details><summary>{title}</summary>{content}</details>"
+
+
+def _pair(parts: Iterable[str]) -> str:
+    return f'<div class="pair">{"".join(f"<div>{part}</div>" for part in parts if part)}</div>'
+
+
+def _data_lines(flights: Sequence[ShownFlight]) -> str:
+    """Return a line a log: how long, whether all of it is there."""
+    said = []
+    for flight in flights:
+        lost = len(flight.summary["losses"]["ranges"])
+        losses = f"{lost} lost range{'s' * (lost > 1)}" if lost else "nothing lost"
+        told = f"{flight.name}: {flight.summary['duration_s']:.0f} s, {losses}"
+        said.append(f'<p class="facts">{escaped(told)}</p>')
+    return "".join(said)
+
+
+def _reasons(found: Identification) -> str:
+    return f"<pre>{escaped_lines([*found.verdict, *found.opinion_lines])}</pre>"
 
 
 def _findings(found: Identification) -> str:
@@ -189,7 +215,7 @@ def _overview(flights: Sequence[ShownFlight]) -> str:
         track = track_figure(flight)
         if track is not None:
             parts.append(picture(track, f"{flight.name}: track from above, numbered by test point"))
-    return "".join(parts)
+    return _pair(parts)
 
 
 def _pictures(figures: Mapping[str, Any], captions: Mapping[str, str]) -> str:
@@ -198,31 +224,24 @@ def _pictures(figures: Mapping[str, Any], captions: Mapping[str, str]) -> str:
     )
 
 
-def _answer(
-    found: Identification,
-    figures: Mapping[str, Any],
-    numbers: JsonNumbers,
-    at: int,
-    label: str,
-    title: str,
+def _fit_picture(
+    found: Identification, figures: Mapping[str, Any], at: int, label: str, title: str
 ) -> str:
+    if at < len(found.linear):
+        answer = found.linear[at]
+        return picture(model_histories(answer), f"{title}: {caption(answer)}")
+    return _pictures(figures, {"coefficients_fit": f"{title}: measured and model"})
+
+
+def _estimates(found: Identification, numbers: JsonNumbers, at: int, label: str, title: str) -> str:
     causes: dict[str, str] = {}
     if label in found.table.index:
         widest = found.table.loc[label]["widened_by"]
         causes = {str(name): str(cause) for name, cause in widest.items()}
-    parts = []
-    if at < len(found.linear):
-        answer = found.linear[at]
-        parts.append(picture(model_histories(answer), f"{title}: {caption(answer)}"))
-    else:
-        parts.append(_pictures(figures, {"coefficients_fit": f"{title}: measured and model"}))
-    parts.append(_pictures(figures, {f"{label}_bode": f"{title}: frequency responses"}))
-    parts.append(fit_table(numbers, at))
-    parts.append("<h3>Parameters</h3>" + parameter_tables(numbers, at, label, causes))
+    said = parameter_tables(numbers, at, label, causes)
     if found.prior is not None and numbers.document["answers"][at].get("coefficients"):
-        parts.append(items(f"prior: {line}" for line in found.prior.source if line))
-    parts.append(_pictures(figures, {f"{label}_intervals": f"{title}: 95 % intervals"}))
-    return _section(f"Measured against model: {escaped(title)}", "".join(parts))
+        said += items(f"prior: {line}" for line in found.prior.source if line)
+    return f"<h3>{escaped(title)}</h3>{said}"
 
 
 def _appendix(parts: ReportParts, documents: Mapping[str, str]) -> str:
@@ -236,11 +255,10 @@ def _appendix(parts: ReportParts, documents: Mapping[str, str]) -> str:
     files = [
         [escaped(name), f"<code>{escaped(value)}</code>"] for name, value in parts.hashes.items()
     ]
-    return _section(
-        "Appendix",
+    return (
         f"<h3>Command</h3><pre>{escaped(parts.command)}</pre>"
         f"<h3>Versions</h3>{table(['what', 'version'], rows, (0, 1))}"
         f"<h3>Files</h3>{table(['file', 'SHA-256'], files, (0, 1))}"
         f"<h3>Numbers</h3><p>{saved}: all numbers of this page, as"
-        " <code>host identify --json</code> prints them.</p>",
+        " <code>host identify --json</code> prints them.</p>"
     )

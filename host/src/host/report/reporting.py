@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -72,6 +73,8 @@ def write_report(request: ReportRequest) -> tuple[Path, Identification]:
     files = list(dict.fromkeys(file_and_flight(one)[0] for one in request.sources))
     first = files[0]
     target = page_file(request.output, first if first.suffix else first / "flight", ".report.html")
+    if request.output is None:
+        target = _not_there_yet(target)
     if any(target.exists() and target.samefile(one) for one in files):
         raise UsageError(f"{target} is the source itself; name another file with -o")
     sheet = _sheet(request.preflight or sheet_beside(first))
@@ -102,6 +105,15 @@ def write_report(request: ReportRequest) -> tuple[Path, Identification]:
     )
     write_text(target, report_page(parts))
     return target, found
+
+
+def _not_there_yet(path: Path) -> Path:
+    """Return a path, with a number where there is a file: a report of before is kept."""
+    numbers = itertools.count(2)
+    stem = path.name.removesuffix(".report.html")
+    while path.exists():
+        path = path.with_name(f"{stem}-{next(numbers)}.report.html")
+    return path
 
 
 def _second_method(

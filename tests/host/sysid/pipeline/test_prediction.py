@@ -75,6 +75,15 @@ def test_a_good_model_predicts_what_it_has_not_seen(saved: Path) -> None:
     assert all(w["over_persistence"]["q_radps"] < 0.1 for w in found["windows"][1:])
 
 
+def test_a_verdict_in_words_names_what_is_not_predicted(saved: Path) -> None:
+    good = host.predict(saved, recorded(2)).to_text().splitlines()[-1]
+    assert good.startswith("  Verdict: predicted by the inputs alone") and "not" not in good
+    lost = recorded(2)
+    lost["q_radps"] = 0.1 * np.random.default_rng(3).standard_normal(len(lost))
+    bad = host.predict(saved, lost).to_text().splitlines()[-1]
+    assert bad.endswith("; q_radps not predicted.")
+
+
 def test_derivatives_are_held(saved: Path) -> None:
     """A record of another aircraft is not fitted: the model is seen to be wrong."""
     right, wrong = (

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from host.constants import DEG_PER_RAD
 from host.sysid.answer.advised_inputs import AdvisedInput, advised_inputs
 from host.sysid.answer.ground_measurements import NO_FILE, ground_measurements
-from host.sysid.answer.known_axes import known_axes
+from host.sysid.answer.known_axes import MOVERS, known_axes
 from host.sysid.answer.mode_lines import JudgedMode, coefficient_modes, linear_modes
 from host.sysid.answer.parameter_words import GOOD, NOT, TINY
 from host.sysid.answer.summary_rows import SummaryRow, summary_rows
@@ -68,6 +68,18 @@ class AnswerSummary:
     def axes(self) -> dict[str, str]:
         """How well pitch, roll, yaw, and speed with drag are known."""
         return known_axes({row.name: row.mark for row in self.rows})
+
+    @property
+    def known(self) -> str:
+        """How well each motion is known; of a model of the user's, its parameters."""
+        if self.axes:
+            said = ", ".join(f"{axis} {word}" for axis, word in self.axes.items())
+            left = [axis for axis in MOVERS if axis not in self.axes]
+            others = f"; no {', '.join(left)}" if left else ""
+            return f"Known from this flight: {said}{others}."
+        words = [row.word for row in self.rows]
+        said = ", ".join(f"{words.count(word)} {word}" for word in dict.fromkeys(words))
+        return f"Known from this flight, of {len(words)} parameters: {said or 'none'}."
 
     @cached_property
     def modes(self) -> list[JudgedMode]:

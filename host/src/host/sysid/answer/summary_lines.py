@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from host.constants import CARE_SHARE, TRUST_SHARE
 from host.log.ledger import LOST
 from host.sysid.answer.answer_summary import AnswerSummary, counted
-from host.sysid.answer.known_axes import MOVERS
 
 if TYPE_CHECKING:
     from host.sysid.answer.summary_rows import SummaryRow
@@ -40,7 +39,7 @@ def summary_lines(
     notes = [note for note in notes if not note.startswith(LOST)]
     above = [
         *lost,
-        known_line(summary),
+        summary.known,
         *_packed([one.text for one in summary.modes], "  ", COLUMNS),
     ]
     not_known = _not_known(summary)
@@ -75,18 +74,6 @@ def cut(text: str, width: int = COLUMNS) -> str:
     if len(text) <= width:
         return text
     return text[: width - 3].rpartition(" ")[0].rstrip(" ,;:") + "..."
-
-
-def known_line(summary: AnswerSummary) -> str:
-    """Return how well each motion is known; of a model of the user's, its parameters."""
-    if summary.axes:
-        said = ", ".join(f"{axis} {word}" for axis, word in summary.axes.items())
-        left = [axis for axis in MOVERS if axis not in summary.axes]
-        others = f"; no {', '.join(left)}" if left else ""
-        return f"Known from this flight: {said}{others}."
-    words = [row.word for row in summary.rows]
-    said = ", ".join(f"{words.count(word)} {word}" for word in dict.fromkeys(words))
-    return f"Known from this flight, of {len(words)} parameters: {said or 'none'}."
 
 
 def _finding(finding: Finding) -> str:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from host.sysid.answer.answer_summary import AnswerSummary, sources_apart
 from host.sysid.answer.method_comparison import method_table
-from host.sysid.answer.summary_lines import COLUMNS, advice_lines, known_line, summary_lines
+from host.sysid.answer.summary_lines import COLUMNS, advice_lines, summary_lines
 from host.sysid.answer.verdict import judge, removed_error_lines
 from host.sysid.checks.data_finding import Finding
 from host.sysid.pipeline.arguments import chosen_stretches, numbers_of, path_of
@@ -242,7 +242,7 @@ class Identification:
 
             pitots = pitot_lines(self.flights, self.agreements)
         if full:
-            known, advice = known_line(self.summary), advice_lines(self.summary)
+            known, advice = self.summary.known, advice_lines(self.summary)
             said = [*pitots, *self.opinion_lines]
             lines = [known, *self.verdict, *said, *advice, *self._numbers(width)]
         else:

@@ -20,8 +20,24 @@ def simulation_lines(one: Simulation, source: str, *, constants: bool) -> list[s
             *_free_lines(m),
             *_one_step_lines(m),
             *_window_lines(m),
+            f"  {verdict(m)}",
         ]
     return lines
+
+
+def verdict(m: SimulatedModel) -> str:
+    """Return in a sentence what the model is worth on this record, by its free simulation.
+
+    A signal is not predicted where who says its mean errs less.
+    """
+    shares = {fit.name: 100.0 * fit.nrmse for fit in m.fits}
+    good = [share for share in shares.values() if share < 100.0]
+    worse = [name for name, share in shares.items() if not share < 100.0]
+    if not good:
+        return "Verdict: the mean of each signal predicts this record better."
+    spread = f"{min(good):.0f} to {max(good):.0f}" if len(good) > 1 else f"{good[0]:.0f}"
+    but = f"; {', '.join(worse)} not predicted" if worse else ""
+    return f"Verdict: predicted by the inputs alone within {spread} % of each signal's spread{but}."
 
 
 def _held(m: SimulatedModel, *, constants: bool) -> str:
