@@ -9,6 +9,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
+IMAGE = re.compile(r'<img src="([^"]+)"')  # with a height, where a picture is taller than a screen
 CODE = re.compile(r"```.*?```", re.DOTALL)
 SOURCE = re.compile(r"`([\w/]+\.(?:py|cpp))`")
 HEADING = re.compile(r"^## (.+)$", re.MULTILINE)
@@ -29,7 +30,8 @@ def tracked(root: Path, *patterns: str) -> list[Path]:
 
 def dead_links(page: Path) -> Iterator[str]:
     """Links of a page that lead nowhere."""
-    for target in LINK.findall(CODE.sub("", page.read_text(encoding="utf-8"))):
+    text = CODE.sub("", page.read_text(encoding="utf-8"))
+    for target in [*LINK.findall(text), *IMAGE.findall(text)]:
         if re.match(r"[a-z]+:", target):
             continue
         place = target.split("#")[0]
@@ -46,10 +48,15 @@ def test_links_lead_somewhere() -> None:
 def test_dead_link_is_seen(tmp_path: Path) -> None:
     page = tmp_path / "README.md"
     page.write_text(
-        "[a](there.md) ![b](gone.svg) [c](https://host/x) `[d](code)`\n```\n[e](f)\n```"
+        "[a](there.md) ![b](gone.svg) [c](https://host/x) `[d](code)`\n```\n[e](f)\n```\n"
+        '<img src="far.png" height="3">'
     )
     (tmp_path / "there.md").touch()
-    assert list(dead_links(page)) == ["README.md: gone.svg", "README.md: code"]
+    assert list(dead_links(page)) == [
+        "README.md: gone.svg",
+        "README.md: code",
+        "README.md: far.png",
+    ]
 
 
 def test_a_source_that_a_page_names_is_there() -> None:
