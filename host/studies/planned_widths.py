@@ -1,6 +1,7 @@
 """What `host plan` promises beside what flights of that card achieve, through the recorder.
 
-One row a coefficient and flight goes to a file that a later run continues.
+One row a coefficient, flight and estimator goes to a file that a later run continues. Beside it:
+where a half-width is what `host live` calls enough, is the coefficient trusted at home?
 """
 
 from __future__ import annotations
@@ -10,12 +11,16 @@ import itertools
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from host.aircraft.file import load as load_aircraft
+from host.constants import TRUST_SHARE
+from host.errors import IdentificationError
 from host.planning.card_design import design
+from host.planning.optimal_card import optimal_card
 from host.planning.predicted_widths import predict_widths
 from host.readers.even_grid import even_columns
-from host.sysid.answer import true_coefficients
 from host.sysid.pipeline import at_hand, identify_columns
 from host.twin.testcard.cards import Card, load
 from host.twin.virtual import virtual_flight
@@ -24,17 +29,23 @@ from studies.demonstration import PRINCIPAL
 from studies.stored_rows import flown_rows, seeded_run
 
 FIRST_SEED = 31_200
-KEPT = 1.5  # times the promise, or one over it
-COLUMNS = ("cell", "seed", "name", "true", "estimate", "half_width", "promised")
+DEFAULT, COEFFICIENTS = "default", "coefficients"
+TRUSTED, MISSING = "trust", "missing"
+COLUMNS = (
+    "cell", "seed", "model", "name", "true", "estimate", "half_width", "mark", "promised",
+)  # fmt: skip
 
 
 def cells() -> dict[str, Card]:
-    """Return the cards: one of ours, and designed ones for two aircraft."""
+    """Return the cards: one of ours, designed ones for two aircraft, an optimal one."""
     kadet = design("kadetlt40")
+    optimal = optimal_card(load_aircraft("ultrastick25e")).card
     return {
         "demo, 0.3 m/s": load("demo"),
         "designed, ultrastick25e, 0.3 m/s": _in_gusts(design("ultrastick25e"), 0.3),
         "designed, kadetlt40, 0.6 m/s": _in_gusts(kadet, 0.6),
+        "optimal, ultrastick25e, calm": _in_gusts(optimal, 0.0),
+        "optimal, ultrastick25e, 0.3 m/s": _in_gusts(optimal, 0.3),
     }
 
 
@@ -45,35 +56,56 @@ def _in_gusts(card: Card, gusts_mps: float) -> Card:
 def rows_of(
     cell: str, card: Card, seed: int, promised: dict[str, float]
 ) -> list[dict[str, object]]:
-    """Fly and identify as the verbs do; the principal derivatives of both axes."""
+    """Fly through the recorder; principal coefficients of both estimators, missing ones too."""
     flight = virtual_flight(card, seed)
     columns, _ = even_columns(flight.table)
-    answers = identify_columns(at_hand(columns, aircraft=card.aircraft)).linear
+    truth = {"first_row_s": 0.0, "maneuver": list(flight.maneuvers)}
     rows: list[dict[str, object]] = []
-    for answer in answers:
-        truth = true_coefficients({"maneuver": list(flight.maneuvers)}, answer.template)
-        for c in answer.coefficients:
-            if c.name in PRINCIPAL:
-                values = (cell, seed, c.name, truth[c.name], c.value, c.half_width)
-                rows.append(dict(zip(COLUMNS, (*values, promised[c.name]), strict=True)))
+    for model in (DEFAULT, COEFFICIENTS):
+        told: dict[str, tuple[Any, ...]] = {}
+        try:
+            answer = identify_columns(
+                at_hand(columns, aircraft=card.aircraft),
+                models=None if model == DEFAULT else model,
+                truth=truth,
+            )
+            marks = answer.table["verdict"].to_dict()
+            for of, compared in answer.document()["truth"].items():
+                for name, own in compared.items():
+                    values = (own["truth"], own["value"], own["half_width"], marks.get((of, name)))
+                    told[name] = values
+        except IdentificationError:
+            pass
+        for name in PRINCIPAL:
+            values = told.get(name, (np.nan, np.nan, np.inf, MISSING))
+            row = (cell, seed, model, name, *values, promised.get(name, np.nan))
+            rows.append(dict(zip(COLUMNS, row, strict=True)))
     return rows
 
 
 def table(rows: Sequence[dict[str, str]]) -> list[str]:
-    """Return a line a cell, then what all come to."""
-    lines = ["cell                                 promised % achieved %  kept of       holds of"]
-    groups = {cell: [r for r in rows if r["cell"] == cell] for cell in {r["cell"] for r in rows}}
-    for cell, own in (*sorted(groups.items()), ("all", list(rows))):
+    """Return a line a cell and estimator: widths, what they hold, what is enough and trusted."""
+    lines = [
+        "| card | model | promised % | achieved % | over promised, 90 % of them | holds | trust"
+        " | enough | enough, not trust |",
+        "| --- " * 9 + "|",
+    ]
+    places = dict.fromkeys((r["cell"], r["model"]) for r in rows)
+    for cell, model in places:
+        own = [r for r in rows if (r["cell"], r["model"]) == (cell, model)]
         truth, value, half, promised = (
             np.array([float(r[k]) for r in own])
             for k in ("true", "estimate", "half_width", "promised")
         )
-        kept = (half < KEPT * promised) & (half > promised / KEPT)
-        held = np.abs(value - truth) <= promised
-        widths = (100.0 * np.median(x / np.abs(truth)) for x in (promised, half))
+        trusted = np.array([r["mark"] == TRUSTED for r in own])
+        enough = half <= TRUST_SHARE * np.abs(value)
+        known = np.isfinite(value)
+        held = int(np.sum(np.abs(value - truth)[known] <= half[known]))
+        by_plan, by_flight = (100.0 * np.nanmedian(x / np.abs(truth)) for x in (promised, half))
+        over = np.percentile(half / promised, 90.0)
         lines.append(
-            f"{cell:35s}  {next(widths):9.1f} {next(widths):10.1f}  {np.sum(kept):4d} {len(own):4d}"
-            f" ({100.0 * np.mean(kept):4.1f} %)  {np.sum(held):4d} ({100.0 * np.mean(held):4.1f} %)"
+            f"| {cell} | {model} | {by_plan:.1f} | {by_flight:.1f} | {over:.2f} | {held} of"
+            f" {len(own)} | {np.sum(trusted)} | {np.sum(enough)} | {np.sum(enough & ~trusted)} |"
         )
     return lines
 

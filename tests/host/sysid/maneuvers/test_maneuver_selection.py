@@ -202,6 +202,7 @@ def test_one_reason_for_two_models_is_said_once(
 def test_a_wrong_model_is_said_before_the_data_are_read(
     model: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    (tmp_path / "no.csv").write_text("no table")
     assert main(["identify", str(tmp_path / "no.csv"), "--model", model]) == 2
     assert re.search(words, capsys.readouterr().err)
 

@@ -38,7 +38,9 @@ def grade(columns: Mapping[str, Array], item: DetectedManeuver) -> Grade:
     inside = (t >= item.start_s) & (t <= item.end_s)
     before = (t >= item.start_s - TRIM_S) & (t < item.start_s)
     after = (t > item.input_end_s + 0.3) & (t <= item.end_s)
-    noise = float(np.std(np.diff(response[inside], n=2))) / np.sqrt(6.0) if inside.sum() > 8 else 0
+    # Of the trim before: between slow rows, as a radio's, the motion itself turns.
+    still = before if before.sum() > 8 else inside
+    noise = float(np.std(np.diff(response[still], n=2))) / np.sqrt(6.0) if still.sum() > 8 else 0.0
     power = float(np.std(response[inside])) if inside.any() else 0.0
     ratio = power / max(noise, 1e-12)
     # Of a record that was cut to its input neither is known, and neither counts against it.
