@@ -22,9 +22,15 @@ def read_limits(file: Path = LIMITS) -> dict[str, int]:
 
 
 def write_limits(found: dict[str, int], limits: dict[str, int], file: Path = LIMITS) -> None:
-    """Lower each limit to what was found; none rises. Generators are free below theirs."""
+    """Lower each limit to what was found; none rises. Generators are free below theirs.
+
+    Words are rounded up to a hundred, so that a sentence put right needs no other one to go.
+    """
     free = {"generated": limits.get("generated", GENERATED_WORDS)}
-    lower = {name: min(limits.get(name, count), count) for name, count in found.items()} | free
+    room = {
+        name: -(-count // 100) * 100 if count > 1000 else count for name, count in found.items()
+    }
+    lower = {name: min(limits.get(name, count), count) for name, count in room.items()} | free
     rows = [f'"{name}" = {count}' for name, count in lower.items()]
     file.write_text("\n".join([HEAD, "", "[most]", *rows, ""]), encoding="utf-8")
 

@@ -46,5 +46,5 @@ def test_signs_of_a_table_are_no_words() -> None:
 
 def test_limits_only_fall(tmp_path: Path) -> None:
     file = tmp_path / "limits.toml"
-    write_limits({"a": 5, "b": 9}, {"a": 7, "b": 8}, file)
-    assert read_limits(file) == {"a": 5, "b": 8, "generated": 16_000}
+    write_limits({"a": 5, "b": 9, "c": 1101}, {"a": 7, "b": 8, "c": 1900}, file)
+    assert read_limits(file) == {"a": 5, "b": 8, "c": 1200, "generated": 16_000}
