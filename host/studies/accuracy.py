@@ -23,9 +23,9 @@ from host.sysid.models.diagnostics import reference_values
 from host.sysid.numerics import OutputProblem, covariance_of_free, minimise
 from host.thesis.hopfield import network
 
-from studies.aircraft import navion, navion_free, navion_structured
 from studies.data import clean
 from studies.inputs import SHAPES
+from studies.navion import navion, navion_free, navion_structured
 
 SNR = 10.0
 RATES_HZ = (100.0, 20.0)

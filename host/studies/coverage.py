@@ -20,8 +20,8 @@ from host.sysid.models import Maneuver
 from host.sysid.numerics import ArNoise, OutputProblem, autocovariance, covariance_of_free, minimise
 from scipy import signal, stats
 
-from studies.aircraft import navion_structured
 from studies.inputs import multistep_3211
+from studies.navion import navion_structured
 
 SNR = 10.0
 DURATION_S = 20.0

@@ -10,8 +10,8 @@ from host.sysid.models import Maneuver
 from host.sysid.numerics import OutputProblem
 from scipy import linalg
 
-from studies.aircraft import FOOT_M, SPEED_FTPS, navion, navion_structured
 from studies.inputs import SHAPES
+from studies.navion import FOOT_M, SPEED_FTPS, navion, navion_structured
 
 AMPLITUDE_RAD = 0.05
 TRUTH = navion_structured().start

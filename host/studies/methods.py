@@ -15,9 +15,9 @@ from host.sysid.estimators import fit, methods
 from host.sysid.models import Maneuver
 from host.sysid.models.diagnostics import reference_values
 
-from studies.aircraft import navion_structured
 from studies.coverage import NOISES, coloured_noise
 from studies.data import TRUTH, clean, gusty
+from studies.navion import navion_structured
 
 SNR = 10.0
 # A third of a second each and more: these fly a sixth of the seeds of the others, the line search,

@@ -28,8 +28,8 @@ from host.sysid.models.diagnostics import (
 from host.sysid.numerics import OutputProblem, covariance_of_free, minimise
 from scipy import special
 
-from studies.aircraft import TABLE_31_A, TABLE_31_B, navion, navion_structured
 from studies.inputs import SHAPES
+from studies.navion import TABLE_31_A, TABLE_31_B, navion, navion_structured
 from studies.systems import DRAWS
 
 AMPLITUDE_RAD = 0.1

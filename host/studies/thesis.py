@@ -26,8 +26,8 @@ from host.thesis.hopfield import (
     network,
 )
 
-from studies.aircraft import INPUTS, STATES, TABLE_31_A, TABLE_31_B
 from studies.inputs import SHAPES
+from studies.navion import INPUTS, STATES, TABLE_31_A, TABLE_31_B
 from studies.refusal import (
     AMPLITUDE_RAD,
     DURATION_S,

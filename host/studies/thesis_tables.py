@@ -29,8 +29,8 @@ from host.thesis.hopfield import (
 )
 from host.thesis.original_program import SWEEPS, free_run, line_search
 
-from studies.aircraft import INPUTS, STATES, TABLE_31_A
 from studies.inputs import SHAPES
+from studies.navion import INPUTS, STATES, TABLE_31_A
 from studies.study_table import Table, write
 from studies.thesis import thesis_data, truth_31
 

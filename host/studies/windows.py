@@ -31,10 +31,10 @@ from host.sysid.numerics import OutputProblem, covariance_of_free, minimise
 from host.sysid.pipeline import at_hand, identify_columns
 from host.twin.virtual import virtual_flight
 
-from studies.aircraft import navion_structured
 from studies.flights import PRINCIPAL
 from studies.gusts import NOISE, gusty_aircraft
 from studies.inputs import LEAD_S, steps
+from studies.navion import navion_structured
 from studies.stored_rows import rows_file
 
 SNR = 10.0

@@ -24,10 +24,10 @@ from host.sysid.numerics import OutputProblem, minimise
 from host.sysid.numerics.input_coherence import input_coherence
 from host.sysid.pipeline import Identification, at_hand, identify_columns
 
-from studies.aircraft import navion_structured
 from studies.coverage import NOISES as NOISE_COLOURS
 from studies.coverage import SNR, coloured_noise
 from studies.inputs import multistep_3211
+from studies.navion import navion_structured
 from studies.wrong_flights import FAULTS, NOISES, PRINCIPAL, LinearFlight, fly
 
 ALARM_SEED = 20261122

@@ -25,8 +25,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import numpy as np
 from host.sysid.estimators.start_values import start_values
 from host.sysid.numerics import OutputProblem, covariance_of_free, minimise, recursion
-from studies.aircraft import navion_free
 from studies.data import noisy
+from studies.navion import navion_free
 
 from tests.bench import identification_hopfield, identify_log
 from tests.bench.identification_peers import aeroid_fit, lsim_s, scipy_distance

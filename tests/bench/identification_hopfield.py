@@ -19,8 +19,8 @@ from host.arrays import Array
 from host.sysid.estimators.regression import solve_normal_equations
 from host.sysid.models import Maneuver
 from host.thesis.hopfield import iterate_until, largest_stable_gain, network
-from studies.aircraft import FOOT_M, navion_free
 from studies.data import with_rates
+from studies.navion import FOOT_M, navion_free
 
 RHO = 200.0
 SHARE = 0.01  # of the norm of the least-squares answer

@@ -29,6 +29,7 @@ VERBS = {
     "status": "show what the logger says of itself, live over USB",
     "simulate": "fly a virtual test and write the log it would leave",
     "calibrate": "measure zero and slope of every sensor on the bench",
+    "aircraft": "write the file of your aircraft, or check one",
     "card": "write, read, check or erase the logger's flight card over USB",
     "plan": "judge planned maneuvers before they are flown",
     "preflight": "walk round the aircraft: each check turns green by itself",
@@ -48,7 +49,7 @@ VERBS = {
     "completion": "print the script that completes these words in your shell",
 }
 # They draw themselves, ask, or are read by a shell.
-_OWN_DISPLAY = ("live", "preflight", "status", "completion", "calibrate")
+_OWN_DISPLAY = ("live", "preflight", "status", "completion", "calibrate", "aircraft")
 _LONGEST_LINE = 2000  # characters
 _AGAIN_S = 0.02  # until Ctrl-C comes again where Python dropped it
 _EPILOG = """\

@@ -12,9 +12,9 @@ from host.sysid.models.diagnostics import GRADES, NOT_IDENTIFIABLE
 from host.thesis.hopfield import LAMBDA, STEP_S, largest_stable_gain, network
 from studies.__main__ import main
 from studies.accuracy import run_case as accuracy
-from studies.aircraft import INPUTS, STATES, TABLE_31_A, TABLE_31_B
 from studies.flights import overlap
 from studies.methods import runs_of, score
+from studies.navion import INPUTS, STATES, TABLE_31_A, TABLE_31_B
 from studies.refusal import (
     DT_S,
     check_refusal,

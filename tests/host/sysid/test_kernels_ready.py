@@ -16,7 +16,7 @@ STUDIES = Path(__file__).parents[3] / "host"
 METHODS = """
 import json, sys
 from host.sysid.estimators import fit
-from studies.aircraft import navion_structured
+from studies.navion import navion_structured
 from studies.data import TRUTH, with_rates
 
 model = navion_structured().with_start(1.1 * TRUTH)
@@ -49,7 +49,7 @@ built = codes()
 import numpy as np
 from host.aircraft.powerplant import powerplant
 from host.sysid.estimators import fit
-from studies.aircraft import navion_structured
+from studies.navion import navion_structured
 from studies.data import TRUTH, with_rates
 model = navion_structured().with_start(1.1 * TRUTH)
 for method in ("output-error", "filter-error", "hopfield-whitened"):

@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 from host.sysid import fit
-from studies.aircraft import navion_structured
 from studies.data import TRUTH, noisy
+from studies.navion import navion_structured
 
 pytestmark = pytest.mark.usefixtures("machine_code")
 

@@ -14,8 +14,8 @@ from host.thesis.hopfield import (
     network,
 )
 from host.thesis.original_program import line_search
-from studies.aircraft import navion_free
 from studies.data import with_rates
+from studies.navion import navion_free
 
 
 def test_whitened_network_is_least_squares() -> None:

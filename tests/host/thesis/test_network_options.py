@@ -12,8 +12,8 @@ from host.sysid.estimators import read_options
 from host.sysid.estimators.method_options import check_options, options_of
 from host.thesis.hopfield import network
 from host.thesis.original_program import line_search
-from studies.aircraft import navion_free
 from studies.data import with_rates
+from studies.navion import navion_free
 
 from tests.host.short_period_table import identified, short_period_table
 

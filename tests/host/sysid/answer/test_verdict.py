@@ -14,8 +14,8 @@ from host.sysid.models import Trim
 from host.sysid.models.diagnostics import SignalFit, collinearity, reference_values
 from host.sysid.models.modal_analysis import modes, modes_of
 from host.sysid.models.templates import TEMPLATES
-from studies.aircraft import navion_structured
 from studies.data import noisy
+from studies.navion import navion_structured
 
 from tests.host.sysid.verdicts import verdict_lines, verdict_of
 

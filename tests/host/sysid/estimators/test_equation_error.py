@@ -12,8 +12,8 @@ from host.sysid.numerics.differentiation import (
     window_for,
 )
 from scipy import linalg, optimize, signal
-from studies.aircraft import navion, navion_free, navion_structured
 from studies.data import TRUTH, clean, noisy, with_rates
+from studies.navion import navion, navion_free, navion_structured
 
 
 @pytest.mark.parametrize("variant", ["", "-weighted", "-robust", "-total"])

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from host.errors import IdentificationError
 from host.sysid import Maneuver, fit, methods
-from studies.aircraft import navion_structured
 from studies.data import noisy
+from studies.navion import navion_structured
 
 OPTIONS: dict[str, dict[str, object]] = {
     "genetic": {"generations": 2},

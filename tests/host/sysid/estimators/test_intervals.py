@@ -5,9 +5,9 @@ import pytest
 from host.sysid import fit
 from host.sysid.numerics.ar_noise import choose_order, fit_ar, lagged_moments, stabilise
 from scipy import signal
-from studies.aircraft import navion_structured
 from studies.coverage import NOISES, coloured_noise
 from studies.data import noisy
+from studies.navion import navion_structured
 
 pytestmark = pytest.mark.usefixtures("machine_code")
 

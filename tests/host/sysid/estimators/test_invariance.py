@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.sysid import FitResult, LinearModel, Maneuver, fit, methods
-from studies.aircraft import navion_structured
 from studies.data import TRUTH, noisy
+from studies.navion import navion_structured
 
 RAW = ("hopfield", "hopfield-line-search")
 INVARIANT = [name for name in methods() if name not in RAW]

@@ -9,8 +9,8 @@ from host.sysid.numerics import FilterProblem, OutputProblem, minimise
 from host.sysid.numerics.chirp_z import transform
 from host.sysid.numerics.riccati import predicted_covariance
 from scipy import linalg, signal
-from studies.aircraft import navion, navion_free, navion_structured
 from studies.data import TRUTH, clean, gusty, noisy
+from studies.navion import navion, navion_free, navion_structured
 
 pytestmark = pytest.mark.usefixtures("machine_code")
 

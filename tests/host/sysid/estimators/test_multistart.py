@@ -11,9 +11,9 @@ from host.sysid.estimators.start_values import start_values
 from host.sysid.models import LinearModel, Maneuver, free_model
 from host.sysid.numerics import OutputProblem
 from host.sysid.numerics.output_error import Optimum, minimise
-from studies.aircraft import navion_free
 from studies.data import noisy
 from studies.inputs import SHAPES
+from studies.navion import navion_free
 from studies.systems import random_system, simulated
 
 pytestmark = pytest.mark.usefixtures("machine_code")

@@ -2,9 +2,9 @@
 
 import numpy as np
 from host.sysid import Maneuver, fit
-from studies.aircraft import navion_structured
 from studies.coverage import NOISES, coloured_noise
 from studies.data import TRUTH, clean, gusty, noisy
+from studies.navion import navion_structured
 
 
 def remembering(seed: int) -> Maneuver:

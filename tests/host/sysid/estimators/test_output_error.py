@@ -10,8 +10,8 @@ from host.sysid.estimators import fit_output_error
 from host.sysid.estimators.start_values import start_values
 from host.sysid.numerics import OutputProblem, covariance_of_free, minimise
 from scipy import optimize
-from studies.aircraft import navion_free, navion_structured
 from studies.data import TRUTH, clean, noisy
+from studies.navion import navion_free, navion_structured
 
 
 def test_optimum_equals_scipy_least_squares() -> None:

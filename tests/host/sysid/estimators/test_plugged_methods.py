@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 from host.cli import main
 from host.sysid import fit, methods
-from studies.aircraft import navion_free
 from studies.data import with_rates
+from studies.navion import navion_free
 
 from host import plugins
 from tests.host.short_period_table import identified, short_period_table

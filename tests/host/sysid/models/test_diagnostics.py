@@ -24,8 +24,8 @@ from host.sysid.models.diagnostics import (
 )
 from host.sysid.models.modal_analysis import modes, modes_of
 from scipy import signal, stats
-from studies.aircraft import navion, navion_free, navion_structured
 from studies.data import TRUTH, noisy
+from studies.navion import navion, navion_free, navion_structured
 
 from tests.host.sysid.verdicts import verdict_lines, verdict_of
 

@@ -11,9 +11,9 @@ from host.sysid.numerics import OutputProblem, autocovariance, minimise, output_
 from host.sysid.numerics.input_coherence import InputCoherence, block_means, input_coherence
 from host.sysid.numerics.input_regressors import input_regressors, lag_knots_s
 from scipy import signal
-from studies.aircraft import navion_structured
 from studies.coverage import coloured_noise
 from studies.inputs import multistep_3211
+from studies.navion import navion_structured
 
 DT_S, DURATION_S = 0.05, 20.0
 COLOURS = {"white": [], "AR(1) 0.5": [0.5], "AR(1) 0.9": [0.9]}

@@ -9,8 +9,8 @@ from host.sysid.numerics.maneuver_agreement import (
     disagreement,
     maneuver_agreement,
 )
-from studies.aircraft import navion_structured
 from studies.data import TRUTH, noisy
+from studies.navion import navion_structured
 
 pytestmark = pytest.mark.usefixtures("machine_code")
 

@@ -5,8 +5,8 @@ import pytest
 from host.sysid.models import Maneuver
 from host.sysid.numerics import ArNoise, OutputProblem
 from host.sysid.numerics.score_variance import variance_ratio
-from studies.aircraft import navion_structured
 from studies.inputs import multistep_3211
+from studies.navion import navion_structured
 
 DT_S, DEVIATION = 0.05, 0.01
 

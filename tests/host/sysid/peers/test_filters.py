@@ -24,8 +24,8 @@ from statsmodels.tsa.ar_model import AutoReg, ar_select_order
 from statsmodels.tsa.arima_process import arma_acovf
 from statsmodels.tsa.statespace.kalman_filter import KalmanFilter
 from statsmodels.tsa.statespace.sarimax import SARIMAX
-from studies.aircraft import navion, navion_structured
 from studies.data import TRUTH, noisy
+from studies.navion import navion, navion_structured
 
 RESONANT = np.array([1.6, -0.8])
 

@@ -12,8 +12,8 @@ from scipy import linalg, signal
 from statsmodels.regression.recursive_ls import RecursiveLS
 from statsmodels.stats.diagnostic import acorr_ljungbox
 from statsmodels.tsa import stattools
-from studies.aircraft import navion_free
 from studies.data import with_rates
+from studies.navion import navion_free
 
 PITCH = ("a31", "a32", "a33", "a34", "b31")
 
