@@ -21,6 +21,7 @@ from host.compiled import prefer_machine_code
 from host.errors import IdentificationError
 from host.instrument.deviations import sensor_error_model
 from host.physical.calibration import load_calibration
+from host.physical.recording import SURFACES, Recording
 from host.readers.even_grid import even_columns
 from host.sysid.maneuvers import detect_maneuvers
 from host.sysid.pipeline import AircraftData, FlightAtHand, aircraft_data, at_hand, identify_columns
@@ -31,14 +32,25 @@ from studies.judgement.judged_rows import PRINCIPAL
 CARD, AIRCRAFT = "demo", "ultrastick25e"
 METHODS = {"longitudinal": "filter-error-gust", "lateral": "output-error-white"}
 MEDIAN, TENTH = 0.97, 0.90  # least ratio of half-widths: in the median, at the tenth percentile
+GPS, ATTITUDE = ("v_north", "v_east", "v_down"), ("phi", "theta", "psi")
+COMMAND = "command of "  # begins the name of a surface's command
+SETTLED_ROWS, STILL_US = 30, 1.0  # a servo is where its pulse tells it to be
 Columns = Mapping[str, Array]
 
 
-def without(*begins: str) -> Callable[[Columns], FlightAtHand]:
-    """Return a flight with a file, and without columns that begin so."""
-    return lambda columns: at_hand(
-        {n: c for n, c in columns.items() if not n.startswith(begins)}, aircraft=AIRCRAFT
-    )
+def without(
+    *begins: str, aircraft: str | AircraftData | None = AIRCRAFT, pots: bool = True
+) -> Callable[[Columns], FlightAtHand]:
+    """Return a flight without columns that begin so; without pots surfaces are commands."""
+
+    def flight(columns: Columns) -> FlightAtHand:
+        kept = {n: c for n, c in columns.items() if not n.startswith((*begins, COMMAND))}
+        if pots:
+            return at_hand(kept, aircraft=aircraft)
+        commands = {f"{n}_rad": columns[f"{COMMAND}{n}"] for n in SURFACES}
+        return at_hand(kept | commands, aircraft=aircraft, recording=Recording(commanded=SURFACES))
+
+    return flight
 
 
 def uncalibrated() -> AircraftData:
@@ -48,21 +60,23 @@ def uncalibrated() -> AircraftData:
 
 
 LESS: dict[str, Callable[[Columns], FlightAtHand]] = {
-    "no calibration": lambda columns: at_hand(columns, aircraft=uncalibrated()),
-    "no aircraft file": lambda columns: at_hand(columns),
-    "no GPS": without("gps", "north", "east", "down"),
-    "no attitude": without("phi", "theta", "psi"),
-    "no beta vane": without("beta"),
-    "neither file nor GPS": lambda columns: at_hand(
-        {n: c for n, c in columns.items() if not n.startswith(("gps", "north", "east", "down"))}
-    ),
+    "calibration": without(aircraft=uncalibrated()),
+    "aircraft file": without(aircraft=None),
+    "GPS": without(*GPS),
+    "pots": without(pots=False),
+    "attitude": without(*ATTITUDE),
+    "beta vane": without("beta"),
+    "aircraft file, GPS": without(*GPS, aircraft=None),
+    "calibration, GPS, attitude": without(*GPS, *ATTITUDE, aircraft=uncalibrated()),
+    "aircraft file, pots": without(aircraft=None, pots=False),
+    "all of these": without("beta", *GPS, *ATTITUDE, aircraft=None, pots=False),
 }
 
 
 def half_widths(flight: FlightAtHand, columns: Columns) -> dict[str, float]:
     """Return the half-width of each principal derivative; nothing where none is estimated."""
     found: dict[str, float] = {}
-    windows = tuple(detect_maneuvers(columns))
+    windows = tuple(detect_maneuvers(columns))  # by the pots, whatever the flight has
     for model, method in METHODS.items():
         try:
             answer = identify_columns(
@@ -82,7 +96,7 @@ def half_widths(flight: FlightAtHand, columns: Columns) -> dict[str, float]:
 
 def ratios(columns: Columns, less: Sequence[str]) -> dict[str, dict[str, float]]:
     """Return for each way to know less the half-widths over those of a flight with a file."""
-    whole = half_widths(at_hand(columns, aircraft=AIRCRAFT), columns)
+    whole = half_widths(without()(columns), columns)
     found = {}
     for name in less:
         own = half_widths(LESS[name](columns), columns)
@@ -91,8 +105,15 @@ def ratios(columns: Columns, less: Sequence[str]) -> dict[str, dict[str, float]]
 
 
 def flown(seed: int) -> Columns:
-    """Return the columns of a flight of the twin, every tolerance drawn."""
-    columns, _notes = even_columns(virtual_flight(CARD, seed).table)
+    """Return the columns of a flight of the twin, every tolerance drawn, and surfaces' commands."""
+    table = virtual_flight(CARD, seed).table
+    columns, _notes = even_columns(table)
+    for surface in SURFACES:
+        pulse = np.interp(columns["t_s"], table["t_s"], table[f"servo_{surface}_us"])
+        before = np.concatenate([np.full(SETTLED_ROWS, np.nan), pulse[:-SETTLED_ROWS]])
+        settled = np.abs(pulse - before) < STILL_US
+        line = np.polyfit(pulse[settled], columns[f"{surface}_rad"][settled], 1)
+        columns[f"{COMMAND}{surface}"] = np.polyval(line, pulse)
     return columns
 
 
@@ -108,9 +129,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for less, own in ratios(flown(seed), tuple(LESS)).items():
             for name, ratio in own.items():
                 every.setdefault(less, {}).setdefault(name, []).append(ratio)
-    print(
-        "| known less | derivative | median | tenth percentile | |\n| --- | --- | --- | --- | --- |"
-    )
+    print("| without | derivative | median | tenth percentile | |\n| --- | --- | --- | --- | --- |")
     for less, table in every.items():
         for name, values in table.items():
             middle, low = float(np.median(values)), float(np.percentile(values, 10))

@@ -8,7 +8,11 @@ import numpy as np
 import pytest
 from host.arrays import Array
 from host.errors import IdentificationError
+from host.sysid.flight.flown_maneuver import FlownManeuver
+from host.sysid.flight.reconstructed_flight import ReconstructedFlight
+from host.sysid.linear.linear_model import with_starts_of
 from host.sysid.linear.users_model import fit_by_evidence, fit_users_model
+from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models import LinearModel, Maneuver, model_from
 from scipy import signal
 
@@ -170,3 +174,36 @@ def test_a_filter_that_turns_out_singular_leaves_the_other_noise(
     found = fit_by_evidence(short_period(), [flown("coloured")], AIRSPEED_MPS)
     assert found.method == "output-error"
     assert "gust: filter-error-gust does not converge on mine" in found.remarks[0]
+
+
+@pytest.mark.parametrize("given", [False, True])
+def test_a_known_start_is_that_of_the_record_or_of_a_stretch_given(given: bool) -> None:
+    """A doublet found inside a record begins wherever the aircraft is then."""
+    data = flown("white")
+    columns = {
+        "t_s": np.arange(SAMPLES) * DT_S,
+        "elevator_rad": data.inputs[:, 0],
+        "alpha_rad": data.outputs[:, 0],
+        "q_radps": data.outputs[:, 1],
+    }
+    window = DetectedManeuver(
+        "elevator_rad", "doublet", 4.2, 4.7, 7.0, 0.06, 3, given=given, lead_s=0.0
+    )
+    flight = ReconstructedFlight("", columns, columns, (window,), None, delays_open=True)
+    moving = replace(
+        short_period(), initial_states=("q_radps",), known_starts=(("alpha_rad", 0.0),)
+    )
+    model, remarks = with_starts_of(moving, [FlownManeuver(window, flight, "a doublet")])
+    assert (model is moving) == given
+    assert bool(remarks) != given
+    if not given:
+        assert model.initial_states == ("alpha_rad", "q_radps")
+        assert model.known_starts == ()
+        cut = FlownManeuver(window, flight, "a doublet").cut(model)
+        assert abs(data.outputs[210, 0]) > 5.0 * NOISE[0]  # alpha is not zero there
+        known, freed = (
+            fit_users_model("output-error-white", m, [cut], AIRSPEED_MPS, {})
+            for m in (moving, model)
+        )
+        off = [abs(f.result.value("M_alpha") / TRUTH["M_alpha"] - 1.0) for f in (known, freed)]
+        assert off[1] < 0.05 < off[0]

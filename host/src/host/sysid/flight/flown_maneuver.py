@@ -37,6 +37,11 @@ class FlownManeuver:
         t = self.flight.corrected["t_s"]
         return float(t[1] - t[0])
 
+    @property
+    def begins_its_record(self) -> bool:
+        """Whether it has the first sample."""
+        return self.found.fit_window()[0] <= float(self.flight.corrected["t_s"][0])
+
     def inside(self) -> dict[str, Array]:
         """Return all corrected columns of it, a moment of trim before the input included."""
         return self._inside(self.flight.corrected)

@@ -124,14 +124,30 @@ def choose_model(
     if own is None:
         model, by, remarks = template_and_method(used, trim, template_name, method)
     else:
-        model, by, remarks = own, method, ()
+        by = method
+        model, remarks = with_starts_of(own, (*used, *held))
         if not _delays_free(used, method):
-            model = without_standard_delays(own)
+            model = without_standard_delays(model)
     called = template_name if own is None else model.name
     return ChosenModel(
         called, model, by, method, own is not None, trim, condition, tuple(used), tuple(held),
         remarks,
     )  # fmt: skip
+
+
+def with_starts_of(
+    own: LinearModel, flown: Sequence[FlownManeuver]
+) -> tuple[LinearModel, tuple[str, ...]]:
+    """Return a user's model for some maneuvers, and a remark where it is another.
+
+    Known initial states belong to the start of a record, or of a stretch that the user gave.
+    """
+    if not own.known_starts or all(m.found.given or m.begins_its_record for m in flown):
+        return own, ()
+    known = [state for state, _ in own.known_starts]
+    free = tuple(s for s in own.states if s in (*own.initial_states, *known))
+    remark = f"{', '.join(known)}: known where the record begins, free in maneuvers found inside it"
+    return replace(own, initial_states=free, known_starts=()), (remark,)
 
 
 def template_and_method(
