@@ -53,6 +53,7 @@ REASONS_NO_GPS = {
     "gps_delay_s": "no GPS",
 }
 BY_FILE = "the aircraft file is more accurate"
+ONE_VANE = "it takes both vanes; the calibration stands"
 NO_AGREEMENT = "the sensors did not agree; the calibration stands"
 NOT_EXCITED = "the motion flown does not show it; the calibration stands"
 NOT_EXCITED_NO_GPS = "attitude and gusts do not show it without GPS; the calibration stands"
@@ -169,6 +170,9 @@ def reconstruct(
         if gps or name not in UNOBSERVABLE_WITHOUT_GPS
     }
     vane_delay = None if instrument is None else vane_delay_by_file(instrument, columns)
+    if not vanes:  # one alone takes no part, and is as wrong as its calibration says
+        every = prior(instrument or usual)
+        priors |= {n: every[n] for n in FLOW if f"{n.split('_')[0]}_rad" in columns}
     findings = [_estimate(name, found, priors, vane_delay, gps=gps) for name in priors]
     squares = np.sum(np.hstack(fit.residuals) ** 2, axis=1)
     rms = {
@@ -205,6 +209,8 @@ def _estimate(
             value, deviation = _beside_imu((value, deviation), sd, priors)
     data_informed = deviation < POSTERIOR_PRIOR_RATIO * sd
     reason = "" if data_informed else _reason(name, gps=gps)
+    if name in FLOW and name not in found:
+        reason = ONE_VANE
     if (
         name == DELAYS[0]
         and vane_delay is not None

@@ -1,0 +1,14 @@
+"""Who knows less is never surer: the same flight, maneuvers and methods, knowledge taken away."""
+
+import pytest
+from studies.judgement.knowledge_order import MEDIAN, TENTH, flown, ratios
+
+
+@pytest.mark.costs(20, "a flight of the recorder, identified by both models three times")
+def test_without_a_vane_or_the_aircraft_file_no_interval_is_narrower() -> None:
+    """One vane alone takes no part in the reconstruction; its scale was in no interval then, and
+    Z_alpha without the other vane known to 0.89 of what both told."""
+    for less, own in ratios(flown(1), ("beta vane", "aircraft file")).items():
+        assert min(own.values()) > TENTH, (less, own)
+        assert sorted(own.values())[len(own) // 2] > MEDIAN, (less, own)
+        assert {"Z_alpha", "M_alpha", "N_beta"} <= own.keys()
