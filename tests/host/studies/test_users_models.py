@@ -26,4 +26,4 @@ def test_a_run_goes_on_and_compares_with_the_best(
         assert users_models.main([*arguments, "--flights", flights]) == 0
     assert flown == [(n, seed) for seed in (9, 10) for n in users_models.NOISES]
     line = next(x for x in capsys.readouterr().out.splitlines()[-13:] if x.startswith("gust"))
-    assert line.split()[2:] == ["4.00", "3.00", "4.00", "0.0"]
+    assert line.split()[2:] == ["4.00", "3.00", "7.67", "0.0"]

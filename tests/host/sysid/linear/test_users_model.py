@@ -68,8 +68,8 @@ def flown(kind: str, seed: int = 4) -> Maneuver:
     ("kind", "method", "words"),
     [
         ("white", "output-error-white", "white, for residuals are not coloured"),
-        ("coloured", "output-error", "coloured noise (BIC"),
-        ("gust", "filter-error-gust", "gusts (BIC"),
+        ("coloured", "output-error-white", "noise model: white (what was not fitted"),
+        ("gust", "filter-error-gust", "noise model: gusts (what was not fitted"),
     ],
 )
 def test_the_noise_of_the_data_chooses_the_method_and_it_is_said(
@@ -172,7 +172,7 @@ def test_a_filter_that_turns_out_singular_leaves_the_other_noise(
 
     monkeypatch.setattr("host.sysid.numerics.filter_problem.FilterProblem.scoring", singular)
     found = fit_by_evidence(short_period(), [flown("coloured")], AIRSPEED_MPS)
-    assert found.method == "output-error"
+    assert found.method == "output-error-white"
     assert "gust: filter-error-gust does not converge on mine" in found.remarks[0]
 
 

@@ -1,9 +1,9 @@
 """A user's model: the method that was asked for, or the one for the noise that the data show.
 
-Three kinds of noise are compared by an exact likelihood on the same outputs: white noise of the
-sensors, noise with a memory, and moving air that the aircraft follows. The last is filter error,
-with the gust as a state where the model has a vane and the airspeed is known. What was asked for is
-done or refused, never replaced.
+Output error takes noise for white and pays for coloured residuals in its intervals (Morelli &
+Klein), unless moving air that the aircraft follows tells more of what was not fitted. That is
+filter error, with the gust as a state where the model has a vane and the airspeed is known. What
+was asked for is done or refused, never replaced.
 """
 
 from __future__ import annotations
@@ -19,9 +19,14 @@ from host.sysid.estimators.filter_error import near_its_optimum
 from host.sysid.estimators.filter_error_gust import SLOW_IN_CALM, fit_with_gust
 from host.sysid.estimators.gust_model import VANES
 from host.sysid.estimators.method_fit import fit
-from host.sysid.estimators.noise_model_comparison import bayes_criterion
 from host.sysid.estimators.output_error_fit import sample_periods
 from host.sysid.linear.linear_stages import LinearFit
+from host.sysid.linear.one_step_evidence import (
+    coloured,
+    cost_by_innovations,
+    cost_by_residuals,
+    first_part,
+)
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.residual_delays import advance_outputs
@@ -73,11 +78,9 @@ def fit_users_model(
 def fit_by_evidence(
     model: LinearModel, maneuvers: Sequence[Maneuver], airspeed_mps: float | None
 ) -> LinearFit:
-    """Fit by output error, white or with a memory, or by filter error: whichever explains the data.
+    """Fit by white output error, or by filter error where that tells more of what it did not see.
 
-    The Bayesian information criterion is -2 ln L + k ln N with k unknowns and N samples (Schwarz,
-    Annals of Statistics 6, 1978). Where no output's noise has a memory nothing is left for moving
-    air to explain, and no filter is tried; of a slow sensor it cannot be seen.
+    No filter is tried where residuals are white.
 
     Parameters
     ----------
@@ -89,31 +92,31 @@ def fit_by_evidence(
     IdentificationError
         If output error fails.
     """
-    memory = len(sample_periods(maneuvers)) == 1  # an autoregression is that of one sample period
-    plain = fit_users_model(MEMORY if memory else WHITE, model, maneuvers, airspeed_mps, {})
-    orders = np.asarray(plain.result.details["noise_orders"])
-    coloured = bool(np.any(orders))
-    own = "coloured noise" if coloured else "white noise"
-    seen = not any(m.held for m in maneuvers)  # a memory, between values of a slow sensor
-    if memory and seen and not coloured:
-        named = replace(plain.result, method="output error (white)")
-        line = f"{NOISE_CHOSEN}: white, for residuals are not coloured"
-        return _found(WHITE, named, plain.maneuvers, remarks=(line,))
+    plain = fit_users_model(WHITE, model, maneuvers, airspeed_mps, {})
+    if not coloured(plain.result, maneuvers):
+        return replace(plain, remarks=(f"{NOISE_CHOSEN}: white, for residuals are not coloured",))
     why = no_filter(model, maneuvers) or _too_long(model, maneuvers, len(plain.result.estimate))
     if why:
-        return replace(plain, remarks=(f"{NOISE_CHOSEN}: {own}; no gust tried: {why}",))
+        return replace(plain, remarks=(f"{NOISE_CHOSEN}: white; no gust tried: {why}",))
+    by_filter = GUST if not no_gust_state(model, airspeed_mps) else FILTER
+    first = [first_part(m) for m in maneuvers]
     try:
-        moving = (
-            _filter_fit(model, maneuvers, {})
-            if no_gust_state(model, airspeed_mps)
-            else _gust_fit(model, maneuvers, airspeed_mps)
+        still, moving = (
+            fit_users_model(method, model, first, airspeed_mps, {}) for method in (WHITE, by_filter)
         )
+        ahead = cost_by_residuals(model, still.result, maneuvers)
+        ahead -= cost_by_innovations(model, moving, maneuvers, airspeed_mps)
+        if ahead > 0.0:
+            line = f"{NOISE_CHOSEN}: gusts ({_told(ahead)} sensors' noise)"
+            found = fit_users_model(by_filter, model, maneuvers, airspeed_mps, {})
+            return replace(found, remarks=(line, *found.remarks))
     except IdentificationError as error:
-        return replace(plain, remarks=(f"{NOISE_CHOSEN}: {own}; gust: {error}",))
-    ahead = bayes_criterion(plain.result, maneuvers) - bayes_criterion(moving.result, maneuvers)
-    chosen, name, other = (moving, "gusts", own) if ahead > 0.0 else (plain, own, "gusts")
-    line = f"{NOISE_CHOSEN}: {name} (BIC is {abs(ahead):.0f} lower than with {other})"
-    return replace(chosen, remarks=(line, *chosen.remarks))
+        return replace(plain, remarks=(f"{NOISE_CHOSEN}: white; gust: {error}",))
+    return replace(plain, remarks=(f"{NOISE_CHOSEN}: white ({_told(-ahead)} gusts)",))
+
+
+def _told(ahead: float) -> str:
+    return f"what was not fitted is e^{ahead:.0f} times likelier than by"
 
 
 def _too_long(model: LinearModel, maneuvers: Sequence[Maneuver], unknowns: int) -> str:
