@@ -66,10 +66,20 @@ ESTIMATES = """(async () => {
   const first = showEstimates(said(known, row("Cn_r", -0.1, 55, 20), row("Cl_p", null, null, 15)));
   const more = showEstimates(said(known, row("Cn_r", -0.1, 12, 20), row("Cl_p", null, null, 15)));
   const lines = [...document.querySelectorAll("#estimates-rows tr")].map((line) => line.innerText);
-  return { first, more, lines, hidden: document.getElementById("estimates-box").hidden,
+  const shown = { first, more, lines,
+    hidden: document.getElementById("estimates-box").hidden,
     head: document.getElementById("estimates-text").innerText,
     foot: document.getElementById("estimates-said").innerText,
     markup: document.querySelectorAll("#estimates-said b").length };
+  const next = { text: "a doublet", points: 1, seconds: 6, for: ["Cn_r"] };
+  const called = [true, false].map((hasCard) => {
+    showEstimates({ ...said(known), next }, hasCard);
+    return document.getElementById("estimates-next").innerText.split(":")[0];
+  });
+  const { History } = await import("./history.js");
+  const compass = new History(["t_s", "psi_deg"], 30);
+  const heading = compass.drawn("psi_deg", -90, 1);
+  return { ...shown, called, heading };
 })()"""
 
 
@@ -148,6 +158,7 @@ def look(live: ServedPage, folder: Path) -> None:
         assert page.console_errors == []
         told = page.evaluate(ESTIMATES)
         assert (told["first"], told["more"], told["hidden"]) == (True, True, False), told
+        assert (told["called"], told["heading"]) == (["after the card", "next"], 270), told
         assert told["head"] == "2 of 3 enough"
         assert [("enough" in line, line.split()[0]) for line in told["lines"]] == [
             (True, "Cm"), (True, "Cn"), (False, "Cl"),

@@ -50,25 +50,26 @@ function said(estimates) {
   return estimates.until_s === null ? "waiting for a test point" : `${points}${open}, to ${estimates.until_s.toFixed(0)} s`;
 }
 
-// What to fly next for what is still missing, as far as one can tell now.
-function nextWords(next) {
+// What to fly next for what is still missing, as far as one can tell now. While a card is flown its
+// own next point is the one that the page calls next.
+function nextWords(next, hasCard) {
   if (!next) return "";
   const left = next.points === 1 ? "the last one" : `about ${next.points} points, ${next.seconds} s`;
   const names = next.for.map((name) => name.replace("_", " ")).join(", ");
-  return `next: ${next.text} (${left}; for ${names})`;
+  return `${hasCard ? "after the card" : "next"}: ${next.text} (${left}; for ${names})`;
 }
 
 let enough = 0;
 
 // Shows the estimates; returns true when one more derivative is known well enough.
-export function showEstimates(estimates) {
+export function showEstimates(estimates, hasCard) {
   byId("estimates-box").hidden = !estimates;
   if (!estimates) return false;
   byId("estimates-text").textContent = `${estimates.enough} of ${estimates.rows.length} enough`;
   byId("estimates-rows").replaceChildren(...estimates.rows.map(line));
   const words = said(estimates);
   if (byId("estimates-said").textContent !== words) byId("estimates-said").textContent = byId("estimates-said").title = words;
-  const next = nextWords(estimates.next);
+  const next = nextWords(estimates.next, hasCard);
   if (byId("estimates-next").textContent !== next) byId("estimates-next").textContent = next;
   const more = estimates.enough > enough;
   enough = estimates.enough;

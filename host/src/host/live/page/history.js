@@ -53,10 +53,12 @@ export class History {
     this.forget();
   }
 
-  // What is drawn of a value: nothing where there is none, nor across north, where a turn is no step.
-  drawn(name, value, t) {
-    if (!Number.isFinite(value)) return null;
-    if (name !== "psi_deg") return value;
+  // What is drawn of a value: nothing where there is none. The heading is that of a compass, 0 to 360;
+  // across north, where a turn is no step, nothing is drawn either.
+  drawn(name, given, t) {
+    if (!Number.isFinite(given)) return null;
+    if (name !== "psi_deg") return given;
+    const value = ((given % 360) + 360) % 360;
     if (Math.abs(value - this.heading) > 180) this.turnedAt = t;
     this.heading = value;
     return t - this.turnedAt < TURN_S ? null : value;

@@ -53,7 +53,7 @@ const server = connect({
     if (said.track.length) plan.add(said.track);
     showState(said);
     preflight.show(said.preflight);
-    if (showEstimates(said.estimates)) sound.play([660, 880]);
+    if (showEstimates(said.estimates, Boolean(said.test_point?.next))) sound.play([660, 880]);
     showLearning(said.logger ?? { card: false, age_s: null, rows: [] });
     verdict.show(said.test_point ?? null);
     const marks = said.events.filter((event) => event.kind === "mark").length;
