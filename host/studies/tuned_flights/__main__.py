@@ -4,7 +4,7 @@
 
 One flight of card `demo` is identified and tuned. Its gains are fixed, then flown on aircraft drawn
 from the tolerances of the aircraft file around its truth, and on linear ones drawn from the
-answer's covariance; the autopilot's default gains beside.
+answer's covariance; beside them the autopilot's default gains, and those of PX4's autotune.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from host.arrays import Array
 from host.compiled import prefer_machine_code
 from host.control import AUTOPILOTS, Tuning, tune
 from host.control.actuator import PULSE_PERIOD_S
-from host.control.autopilots.structure import Structure
+from host.control.autopilots.structure import Structure, YawStructure
 from host.control.scenarios import draw as draw_scenarios
 from host.sysid.pipeline import identify
 from host.twin.flight.draws import draw, true_airframe
@@ -38,6 +38,7 @@ from host.twin.virtual import virtual_flight
 from studies.study_table import Table, markdown
 from studies.tuned_flights.closed_loop_flight import AXES, ClosedLoop, Demand, Flown, fly
 from studies.tuned_flights.measured_margins import computed, measured
+from studies.tuned_flights.px4_autotune import autotuned
 from studies.tuned_flights.step_figures import moving_at_the_end, step_figures
 
 AIRCRAFT = "ultrastick25e"
@@ -48,7 +49,7 @@ GUSTS_MPS = (0.0, 1.0, 2.0)
 SERVO_SHARE, BACK_SHARE = 0.5, 0.03  # servo at half speed, CG 3 % of the chord back
 GYRO_NOISE_RADPS = 0.002
 PROCESSES = 2
-DEFAULT_PART = 4  # the default gains fly on every fourth of the aircraft
+OTHER_PART = 4  # default gains and those of PX4's autotune fly on every fourth of the aircraft
 FIRST_SEED = 48_000
 COLUMNS = ("case", "flights", "lost", "moving at the end", "rise s", "overshoot %", "settled s",
            "surface rad/s rms", "dB off", "deg off", "95 % within")  # fmt: skip
@@ -76,14 +77,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     laws = {one.axis: one.problem.structure for one in found.axes}
     sets = {"tuned": {one.axis: dict(one.design.gains or {}) for one in found.axes}}
+    if found.yaw and found.yaw.design.gains:
+        sets["tuned"]["yaw"] = dict(found.yaw.design.gains)
     if found.autopilot.words:
         sets["default"] = {a: {r: s.default for r, s in laws[a].settings.items()} for a in AXES}
+    if asked.autopilot == "px4":
+        sets["autotune's"] = {one.axis: autotuned(one.problem) for one in found.axes}
     drawn = from_covariance(found, asked.aircraft_drawn, asked.first)
     print(f"{drawn[0]} of {drawn[1]} linear aircraft of the answer's covariance are unstable\n")
     with ProcessPoolExecutor(PROCESSES, initializer=prefer_machine_code) as processes:
-        for (name, gains), part in zip(sets.items(), (1, DEFAULT_PART), strict=False):
+        for name, gains in sets.items():
+            part = 1 if name == "tuned" else OTHER_PART
             seeds = range(asked.first, asked.first + max(asked.aircraft_drawn // part, 1))
-            flown = Flights(Craft(laws, gains, found.autopilot.travel_rad), seeds, processes)
+            yaw = found.yaw.problem.yaw if found.yaw and "yaw" in gains else None
+            craft = Craft(laws, gains, found.autopilot.travel_rad, yaw)
+            flown = Flights(craft, seeds, processes)
             print(markdown(flown.table(f"{asked.autopilot}, {name} gains")), flush=True)
     return 0
 
@@ -105,6 +113,7 @@ class Craft:
     laws: Mapping[str, Structure]
     gains: Gains
     full_rad: float | None = None
+    yaw: YawStructure | None = None
 
     def loop(
         self, seed: int, speed_mps: float, servo: float = 1.0, back: float = 0.0
@@ -120,7 +129,7 @@ class Craft:
         )
         pulse_s = float(rng.uniform(0.0, PULSE_PERIOD_S))
         at = solve(frame, speed_mps)
-        return ClosedLoop(frame, at, self.laws, self.gains, pulse_s, self.full_rad)
+        return ClosedLoop(frame, at, self.laws, self.gains, pulse_s, self.full_rad, self.yaw)
 
     def fly(
         self, seed: int, *, speed: float, demand: Demand, gusts: float, changes: tuple[float, ...]

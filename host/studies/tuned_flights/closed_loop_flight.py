@@ -1,8 +1,8 @@
-"""An aircraft in six degrees of freedom flown by an autopilot's roll and pitch laws at their rate.
+"""An aircraft in six degrees of freedom flown by an autopilot's laws at their rate.
 
 Between law and surface stand a pulse every 20 ms, the end of its travel and the servo with its
-bandwidth and rate; between motion and law the gyro's noise and filter. The throttle stays, the
-rudder too.
+bandwidth and rate; between motion and law the gyro's noise and filter. The throttle stays,
+and the rudder where no damper is given.
 """
 
 from __future__ import annotations
@@ -14,23 +14,23 @@ from typing import Any
 
 import numpy as np
 from host.aircraft.air import GUST_STATES, Air, gust_step, turbulence
-from host.aircraft.airframe import AILERON, ELEVATOR, Q0, Q3, Airframe, P, Q, U, W
+from host.aircraft.airframe import AILERON, ELEVATOR, Q0, Q3, Airframe, P, Q, R, U, W
 from host.aircraft.attitude import euler
 from host.aircraft.rigid_body import step
 from host.aircraft.trim import Trim
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.control.actuator import PULSE_PERIOD_S
-from host.control.autopilots.structure import Structure
+from host.control.autopilots.structure import Structure, YawStructure
 from scipy.signal import butter
 
 AXES = ("roll", "pitch")
 LONGEST_STEP_S = 0.0025
 HEIGHT_M = 100.0
 BANK_RAD, PITCH_RAD = math.radians(90.0), math.radians(60.0)  # beyond: the flight is lost
-# Sense of a surface's moment: aileron rolls right, elevator down pitches down.
-SENSE = {"roll": 1.0, "pitch": -1.0}
-COMMANDS = {"roll": 1, "pitch": 0}
+# Sense of a surface's moment: aileron rolls right, elevator down pitches down, rudder left.
+SENSE = {"roll": 1.0, "pitch": -1.0, "yaw": -1.0}
+COMMANDS = {"roll": 1, "pitch": 0, "yaw": 2}
 
 
 @dataclass(frozen=True)
@@ -70,6 +70,8 @@ class ClosedLoop:
         By how much pulses come behind the law's step.
     full_rad : float or None
         Angle of the surface at an output of 1; None is the end of its travel.
+    yaw : YawStructure or None
+        Of the rudder, with its gains under ``yaw``.
     coordinated : bool
         Whether pitch is fed the rate of a turn, as ArduPlane and PX4 do.
     """
@@ -80,6 +82,7 @@ class ClosedLoop:
     gains: Mapping[str, Mapping[str, float]]
     pulse_s: float = 0.5 * PULSE_PERIOD_S
     full_rad: float | None = None
+    yaw: YawStructure | None = None
     coordinated: bool = True
 
 
@@ -123,7 +126,12 @@ def fly(
     pulse_steps = max(round(PULSE_PERIOD_S / span), 1)
     first_pulse = round(loop.pulse_s / span)
     states: dict[str, Array] = {axis: np.zeros(laws[axis].states) for axis in AXES}
-    gyro = {axis: _Filter(loop.laws[axis].gyro_filter_hz, 1.0 / span) for axis in AXES}
+    rudder = loop.yaw.loop(loop.gains["yaw"], speed) if loop.yaw else None
+    mix = loop.yaw.mix(loop.gains["yaw"]) if loop.yaw else 0.0
+    damped: Array = np.zeros(rudder.states if rudder else 0)
+    moving = (*AXES, *(["yaw"] if rudder else []))
+    corner_hz = loop.laws["roll"].gyro_filter_hz
+    gyro = {axis: _Filter(corner_hz, 1.0 / span) for axis in moving}
     air, gusts = np.zeros(9), np.zeros(GUST_STATES)
     dryden = turbulence(Air(turbulence_mps=turbulence_mps), HEIGHT_M)
     start = euler(x[Q0 : Q3 + 1])
@@ -134,8 +142,8 @@ def fly(
     }
     work, moved = np.empty((5, len(x) + 4)), np.zeros(6)
     held = loop.trim.command.copy()
-    rates = dict.fromkeys(AXES, 0.0)
-    total = dict.fromkeys(AXES, 0.0)
+    rates = dict.fromkeys(moving, 0.0)
+    total = dict.fromkeys(moving, 0.0)
     lost = False
     for k in range(count):
         phi, theta, _ = (float(one) for one in euler(x[Q0 : Q3 + 1]))
@@ -159,9 +167,12 @@ def fly(
                 ("surface", x[AILERON if axis == "roll" else ELEVATOR]),
             ):  # fmt: skip
                 kept[name][axis].append(float(value))
+        if rudder:
+            damped, out = rudder.step(damped, np.array(-phi), np.array(rates["yaw"]))
+            total["yaw"] = float(out) + mix * total["roll"]
         for j in range(parts):
             if (k * parts + j - first_pulse) % pulse_steps == 0:
-                for axis in AXES:
+                for axis in moving:
                     number = COMMANDS[axis]
                     limit = frame.surface_limit_rad[number]
                     angle = min(max(total[axis] * (loop.full_rad or limit), -limit), limit)
@@ -171,7 +182,7 @@ def fly(
                 gust_step(dryden, gusts, noise, speed, frame.span_m, span, moved)
                 air[3:] = moved
             step(frame, x, held, air, loop.trim.density_kgpm3, span, work)
-            for axis, number in (("roll", P), ("pitch", Q)):
+            for axis, number in zip(moving, (P, Q, R), strict=False):
                 noise_radps = gyro_noise_radps * rng.standard_normal() if gyro_noise_radps else 0.0
                 rates[axis] = gyro[axis].step(float(x[number]) + noise_radps)
         if not np.isfinite(x).all() or abs(phi) > BANK_RAD or abs(theta) > PITCH_RAD:

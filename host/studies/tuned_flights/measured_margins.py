@@ -21,7 +21,7 @@ from studies.tuned_flights.closed_loop_flight import (
 
 PERIOD_S = 20.0
 SETTLED_PERIODS = 1
-LOWEST_HZ, HIGHEST_HZ, COUNT = 0.1, 9.0, 40
+LOWEST_HZ, HIGHEST_HZ, COUNT = 0.1, 16.0, 40
 LARGEST_SHARE = 0.08  # of travel: below saturation of travel and of the servo's rate
 
 

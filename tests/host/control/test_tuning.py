@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,10 @@ import pytest
 from host.arrays import Array
 from host.control import ControlError, read_parameters
 from host.control.actuator import Actuator, actuator_of
-from host.control.autopilots import ardupilot_yaw
+from host.control.autopilots import ardupilot_yaw, mega
 from host.control.autopilots.known import AUTOPILOTS
+from host.control.autopilots.mega import Mega
+from host.control.autopilots.structure import Setting
 from host.control.axis_tuning import AxisTuning, YawTuning
 from host.control.bandwidth_costs import bandwidth_costs, known
 from host.control.disturbances import gyro_noise_radps
@@ -108,7 +111,7 @@ def test_the_hold_raises_the_crossover_of_the_attitude() -> None:
             other = asked.structure.completed({**found, role: found[role] + sign * step}, 0.0)
             inner, outer = seen.judged(other)
             lacks = Required().missing(inner) + Required().missing(outer) > 0.0
-            slow = float(np.max(seen.surface_rate_radps(other))) > 1.02  # half of 4 rad/s, 95 %
+            slow = float(np.max(seen.moving(other)[0])) > 1.02  # half of 4 rad/s, 95 %
             assert lacks or slow or float(np.min(outer.crossover_radps)) < reached
 
 
@@ -133,22 +136,22 @@ def test_a_log_with_a_low_slew_limit_has_softer_gains() -> None:
     seen = draw(asked, seed=1, count=12)
     free = search(asked, seen, Required())
     assert free is not None
-    unlimited = float(np.max(seen.output_slew_per_s(free)))
+    unlimited = float(np.max(seen.moving(free)[1]))
     # SMAX counts 45 times P and D in radians; gusts reach it 95 % of the time.
     limit_degps = 0.8 * 1.96 * unlimited * (np.pi / 4.0) * 45.0
     law = AUTOPILOTS["ardupilot"].structure("roll", {"RLL_RATE_SMAX": limit_degps}, 15.0)
     slow = replace(seen, problem=replace(asked, structure=law))
     held = search(asked, slow, Required())
     assert held is not None
-    assert float(np.max(seen.output_slew_per_s(held))) <= 0.8 * unlimited
+    assert float(np.max(seen.moving(held)[1])) <= 0.8 * unlimited
 
 
 def test_the_outputs_slew_is_the_surfaces_rate_over_its_travel() -> None:
     # What gusts move is far below servo and filter.
     seen = draw(problem(0.0), seed=3, count=1)
     gains = seen.problem.structure.completed({"P": 0.12, "D": 0.0, "TC": 0.5}, 0.17)
-    ratio = float(seen.surface_rate_radps(gains)[0] / seen.output_slew_per_s(gains)[0])
-    assert ratio == pytest.approx(DRIVE.travel_rad, rel=0.2)
+    surface, output = seen.moving(gains)
+    assert float(surface[0] / output[0]) == pytest.approx(DRIVE.travel_rad, rel=0.2)
 
 
 def test_an_aircraft_that_answers_the_other_way_is_unstable() -> None:
@@ -302,3 +305,32 @@ def test_what_is_around_is_told_and_not_changed() -> None:
     assert "path (L1): at least 18.7 dB, 51 deg: NAVL1_PERIOD 17" in found.to_text()
     assert found.document()["outer_loops"]["path (L1)"]["stable"] is True
     assert found.changes == ()
+
+
+def test_only_the_margin_that_lacked_is_asked_for_more_of() -> None:
+    assert Required().tightened((4.0, 60.0), 0.08) == Required(8.0, 45.0)
+    assert Required().tightened((7.0, 44.0), 0.08) == Required(6.0, 45.0 + 0.08 * 45.0)
+    assert Required(6.5, 50.0).tightened((5.9, 30.0), 0.08) == Required(6.5 + 0.08 * 6.0, 65.0)
+
+
+@dataclass(frozen=True)
+class WideHold(Mega):
+    """The hold with ranges a hundred times as wide."""
+
+    @property
+    def settings(self) -> Mapping[str, Setting]:
+        own = super().settings.items()
+        return {role: replace(one, highest=100.0 * one.highest) for role, one in own}
+
+
+@pytest.mark.costs(10, "two searches over twelve aircraft")
+def test_a_range_that_is_a_hundred_times_as_wide_finds_the_same() -> None:
+    asked = problem(0.1, autopilot="mega")
+    wide = replace(asked, structure=WideHold("roll", mega.structure("roll", {}, 15.0).fixed))
+    seen = draw(asked, seed=1, count=12)
+    reached = []
+    for one in (seen, replace(seen, problem=wide)):
+        gains = search(one.problem, one, Required())
+        assert gains is not None
+        reached.append(float(np.min(seen.judged(gains)[1].crossover_radps)))
+    assert reached[1] > 0.95 * reached[0]

@@ -168,17 +168,21 @@ class Scenarios:
             for k in range(len(self.of_speed[0][0].gusts))
         ]
 
-    def surface_rate_radps(self, gains: Mapping[str, float]) -> Array:
-        """Return the rms rate of the surface in gusts of 1 m/s with the gyro's noise."""
-        moved = np.abs(self._surfaces) ** 2 * self._output_power(gains)
-        return np.asarray(np.sqrt(np.trapezoid(moved, self.frequency_radps, axis=-1)).ravel())
+    def moving(self, gains: Mapping[str, float]) -> tuple[Array, Array]:
+        """Return rms rates in gusts of 1 m/s with the gyro's noise, flat.
 
-    def output_slew_per_s(self, gains: Mapping[str, float]) -> Array:
-        """Return the rms rate of the output, in shares of travel, as a slew limiter sees it."""
-        s = 1j * self.frequency_radps
-        seen = np.abs(s / (1.0 + s / SLEW_FILTER_RADPS)) ** 2
-        power = seen * self._output_power(gains)
-        return np.asarray(np.sqrt(np.trapezoid(power, self.frequency_radps, axis=-1)).ravel())
+        First the surface's, rad/s, then the output's as a slew limiter sees it, shares of travel
+        per second.
+        """
+        w, power = self.frequency_radps, self._output_power(gains)
+        s = 1j * w
+        filtered = s / (1.0 + s / SLEW_FILTER_RADPS)
+
+        def rms(per_output: Spectra) -> Array:
+            found = np.trapezoid(np.abs(per_output) ** 2 * power, w, axis=-1)
+            return np.asarray(np.sqrt(found).ravel())
+
+        return rms(self._surfaces), rms(filtered)
 
     def _output_power(self, gains: Mapping[str, float]) -> Array:
         """Return the output's spectrum in gusts and by noise, shares^2 s, (speeds, N, F)."""

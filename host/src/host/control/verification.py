@@ -36,12 +36,25 @@ class Required:
         phase = 1.0 - float(np.min(found.phase_deg)) / self.phase_deg
         return max(gain, 0.0) + max(phase, 0.0)
 
-    def tightened(self, failed: Verification, least_db: float) -> Required:
-        """Return margins for the next design: by what the unseen aircraft lacked."""
+    def tightened(self, worst: tuple[float, float], least_share: float) -> Required:
+        """Return margins for the next design: each by what unseen aircraft lacked of it.
+
+        Parameters
+        ----------
+        worst : tuple of float
+            Gain (dB) and phase margin (degrees) of the failed verification.
+        least_share : float
+            Of the limit, where one lacked at all.
+        """
         limits = Required()
-        gain = max(limits.gain_db - failed.worst_gain_db, least_db)
-        phase = max(limits.phase_deg - failed.worst_phase_deg, 0.0)
-        return Required(self.gain_db + gain, self.phase_deg + phase)
+
+        def more(limit: float, found: float) -> float:
+            return max(limit - found, least_share * limit) if found < limit else 0.0
+
+        return Required(
+            self.gain_db + more(limits.gain_db, worst[0]),
+            self.phase_deg + more(limits.phase_deg, worst[1]),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +140,7 @@ def verify(
         found[1],
         bool(unseen.stable(gains).all()),
         (float(crossover.min()), float(np.median(crossover)), float(crossover.max())),
-        float(np.max(unseen.surface_rate_radps(gains))),
+        float(np.max(unseen.moving(gains)[0])),
         required,
     )
 

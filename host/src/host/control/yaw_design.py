@@ -9,7 +9,7 @@ import numpy as np
 
 from host.constants import NORMAL_95
 from host.control.lateral_pair import PairProblem, PairScenarios, draw_pair
-from host.control.loop_design import DRAWN, ROUNDS, STEPS_DB, SURFACE_SHARE
+from host.control.loop_design import DRAWN, ROUNDS, STEP_SHARE, SURFACE_SHARE
 from host.control.margins import Margins
 from host.control.verification import UNSEEN, Required
 
@@ -79,10 +79,7 @@ def design_yaw(problem: PairProblem, *, seed: int = 0) -> YawDesign:
             break
         if found.stable and gain_db >= required.gain_db and phase_deg >= required.phase_deg:
             return YawDesign(gains, found, k + 1)
-        asked = Required(
-            asked.gain_db + max(required.gain_db - gain_db, STEPS_DB),
-            asked.phase_deg + max(required.phase_deg - phase_deg, 0.0),
-        )
+        asked = asked.tightened(found.worst, STEP_SHARE)
     return YawDesign(None, found, k + 1)
 
 
