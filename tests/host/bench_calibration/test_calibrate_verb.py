@@ -105,6 +105,30 @@ def test_a_doubted_line_is_drawn_and_not_written(
     assert "pot_rudder (doubted)" in Path("own-pots.svg").read_text()
 
 
+@pytest.mark.parametrize(("typed", "code"), [("y", 0), ("n", 6)])
+def test_vanes_of_another_slope_are_asked_about(
+    typed: str,
+    code: int,
+    bench: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Potentiometers of a third of the slope: their counts move and scatter threefold."""
+    head, *rows = Path("vanes.csv").read_text().splitlines()
+    cells = [row.rpartition(",") for row in rows]
+    other = [f"{place},{512.0 + 3.0 * (float(counts) - 512.0):.3f}" for place, _, counts in cells]
+    Path("vanes.csv").write_text("\n".join([head, *other]) + "\n")
+    monkeypatch.setattr("sys.stdin", io.StringIO(f"{typed}\n"))
+    ended, out, err = _said(capsys, "vanes", "vanes.csv", "--into", "own.toml")
+    assert ended == code
+    assert "Is it another sensor" in err
+    lines = load_calibration("own.toml").lines if code == 0 else {}
+    for channel in ("alpha_a", "beta_b") if code == 0 else ():
+        slope = lines[f"channel.{channel}"].slope[0]
+        assert slope == pytest.approx(0.352 * RAD_PER_DEG / 3.0, rel=0.04)
+    assert ("nothing was written" in out) == (code == 6)
+
+
 def test_typed_readings_are_asked_for_in_words(
     bench: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

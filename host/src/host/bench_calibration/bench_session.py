@@ -21,6 +21,7 @@ from host.bench_calibration.calibration_file import Made, lines_of, write_lines
 from host.bench_calibration.calibration_picture import draw_picture
 from host.bench_calibration.hard_iron import hard_iron
 from host.bench_calibration.held_position import Held, Source
+from host.bench_calibration.other_sensor import judged_subject
 from host.bench_calibration.reading_table import TableSource, number_of, rows_of
 from host.bench_calibration.six_faces import FaceTable, crooked_deg, crooked_doubt
 from host.bench_calibration.supply_reference import NOMINAL_MV, supply_reference
@@ -170,7 +171,8 @@ def _lines(
             held += _over_usb(bench, path, first, ask, say, show)
         else:
             held += _source(bench, path, logs, first, ask, say).held()
-    lines = calibrated_lines(bench.subject, held, density_kgpm3=bench.density_kgpm3)
+    subject = judged_subject(bench.subject, held, ask)
+    lines = calibrated_lines(subject, held, density_kgpm3=bench.density_kgpm3)
     if not lines:
         wanted = bench.channel or ", ".join(bench.subject.channels)
         raise UsageError(f"no reading of {wanted} in {', '.join(map(str, bench.sources))}")
