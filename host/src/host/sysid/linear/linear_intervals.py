@@ -30,7 +30,6 @@ from host.sysid.errors.systematic_errors import (
 )
 from host.sysid.estimators.coherence_inflation import driven_by_inputs, widened_to
 from host.sysid.estimators.gust_penetration import with_unknown_roll_lag
-from host.sysid.estimators.missing_control import absent_effects, missing_control
 from host.sysid.flight.filter_step import others_recorded
 from host.sysid.linear.linear_stages import LinearEstimate, LinearIntervals
 from host.sysid.maneuvers.pilot_takeover import taken_over
@@ -90,7 +89,7 @@ def _statistical(e: LinearEstimate) -> tuple[FitResult, InputCoherence | None]:
     coherence = None if free is None else _coherence(e, free, at_trim)
     of_speed = np.zeros((0, 0)) if e.departure is None else e.departure.airspeed_noise
     noise = _noise(e, free, coherence)
-    known = _with_model_error(e, noise, noise.plus(of_speed), free, coherence, at_trim)
+    known = _with_model_error(e, noise, noise.plus(of_speed), free, coherence)
     known = known.plus(of_speed)  # this noise is known, no model error multiplies it
     # Our own log is fitted in means, which lean less on what the gust is between samples.
     if others_recorded(e.columns.used):
@@ -126,22 +125,15 @@ def _with_model_error(
     scattering: Uncertainty,
     free: FreeResponses | None,
     coherence: InputCoherence | None,
-    at_trim: Sequence[Maneuver],
 ) -> Uncertainty:
-    """Return noise, and what the model lacks by three tests.
+    """Return noise, and what the model lacks by two tests.
 
     `scattering` is the noise that makes maneuvers disagree.
     """
-    airspeed_mps = e.trim.airspeed_mps
     scatter = maneuver_agreement(e.fit.model.parameter_names, scattering)
-    excess = None if free is None else excess_over_noise_model(free, e.fit, airspeed_mps)
-    absent = missing_control(e.fit, at_trim, airspeed_mps)
+    excess = None if free is None else excess_over_noise_model(free, e.fit, e.trim.airspeed_mps)
     return noise.with_model_error(
-        [
-            disagreement(scatter),
-            driven_by_inputs(e.fit, noise, coherence, excess),
-            absent_effects(noise, absent),
-        ],
+        [disagreement(scatter), driven_by_inputs(e.fit, noise, coherence, excess)]
     )
 
 
