@@ -16,7 +16,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from host.arrays import Array
 from host.constants import NORMAL_95
 from host.errors import IdentificationError
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
@@ -30,8 +29,6 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
 from host.sysid.numerics.between_samples import OTHER_HOLD
-from host.sysid.numerics.model_problems import output_problem
-from host.sysid.numerics.output_error_problem import OutputProblem
 
 # Of what kinks do to the estimate, one deviation: a servo of second order and 60 rad/s has none,
 # and passes for one of first order that does half as much.
@@ -137,37 +134,6 @@ def motion_shift(
         size = (step.added[0] / NORMAL_95, wider * np.sqrt(variance))
         steps = np.outer(size, by_share)
     return tuple(ShiftedEstimate(HOLD, result.estimate + step, 1.0, 1.0) for step in steps)
-
-
-def kink_residuals(
-    problem: OutputProblem, theta: Array, flown: Sequence[FlownManeuver]
-) -> list[Array]:
-    """Return what one deviation of what kinks do changes of a free simulation's residual.
-
-    Parameters
-    ----------
-    problem : OutputProblem
-        Of maneuvers whose surfaces move or not.
-    theta : Array
-    flown : sequence of FlownManeuver
-        The same.
-
-    Returns
-    -------
-    list of Array, shape (p, samples, 1)
-        Of each maneuver; nothing where no surface moves or the model diverges.
-    """
-    if not any(m.surfaces_move for m in flown):
-        return []
-    other = output_problem(problem.model, _with_inputs(problem.maneuvers, _on_lines(flown),
-                                                       problem.model))  # fmt: skip
-    here, there = problem.outputs(theta), other.outputs(theta)
-    if here is None or there is None:
-        return []
-    return [
-        KINK_SHARE * (other.residual(k, after) - problem.residual(k, before))[:, :, None]
-        for k, (before, after) in enumerate(zip(here, there, strict=True))
-    ]
 
 
 def _on_lines(flown: Sequence[FlownManeuver]) -> list[FlownManeuver]:

@@ -21,7 +21,7 @@ from host.sysid.aerodynamics.path_thrust import path_thrust
 from host.sysid.errors.airspeed_tolerance import AIRSPEED, airspeed_shift
 from host.sysid.errors.column_noise import column_noise
 from host.sysid.errors.sampling_error import hold_shift
-from host.sysid.errors.surface_motion import kink_residuals, motion_shift, surfaces_known
+from host.sysid.errors.surface_motion import motion_shift, surfaces_known
 from host.sysid.errors.systematic_errors import (
     add_systematic_covariance,
     errors_left_open,
@@ -174,8 +174,6 @@ def _tested(e: LinearEstimate, free: FreeResponses, chosen: Sequence[int]) -> In
     if len(known) == len(used):
         cuts = [e.columns.cuts[k] for k in chosen]
         beside = systematic_residuals(free.problem, free.theta, cuts, known, e.trim)
-        if kinks := kink_residuals(free.problem, free.theta, used):
-            beside = [np.dstack(both) for both in zip(beside, kinks, strict=True)]
     return input_coherence(free.problem, free.responses, free.theta, beside=beside)
 
 
