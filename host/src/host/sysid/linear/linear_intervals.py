@@ -32,7 +32,6 @@ from host.sysid.estimators.coherence_inflation import driven_by_inputs, widened_
 from host.sysid.estimators.gust_penetration import with_unknown_roll_lag
 from host.sysid.flight.filter_step import others_recorded
 from host.sysid.linear.linear_stages import LinearEstimate, LinearIntervals
-from host.sysid.maneuvers.pilot_takeover import taken_over
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.uncertainty import Uncertainty
@@ -46,7 +45,6 @@ from host.sysid.reconstruction.sensor_dynamics import DELAYED_COLUMNS, IMU_DELAY
 from host.sysid.validation.free_simulation import FreeResponses, free_responses
 from host.sysid.validation.noise_model_limits import excess_over_noise_model
 
-LEAST_COMMANDED = 0.25  # of all samples, in maneuvers that a test input made
 WHITE = "output error (white)"  # its noise is judged beside what the inputs drive
 
 
@@ -86,7 +84,7 @@ def _statistical(e: LinearEstimate) -> tuple[FitResult, InputCoherence | None]:
     """
     at_trim = e.at_trim(e.estimate)  # airspeed that varied is known: what it does is no model error
     free = free_responses(e.found.model, e.estimate, at_trim)
-    coherence = None if free is None else _coherence(e, free, at_trim)
+    coherence = None if free is None else _coherence(e, free)
     of_speed = np.zeros((0, 0)) if e.departure is None else e.departure.airspeed_noise
     noise = _noise(e, free, coherence)
     known = _with_model_error(e, noise, noise.plus(of_speed), free, coherence)
@@ -137,43 +135,12 @@ def _with_model_error(
     )
 
 
-def _coherence(
-    e: LinearEstimate, free: FreeResponses, at_trim: Sequence[Maneuver]
-) -> InputCoherence:
-    """Return what the inputs drive beside the model.
-
-    A suspicion is dropped where test inputs alone arouse none, and there are enough of them. A
-    pilot who takes over (`pilot_takeover`) seems to drive what gusts leave: a lag of the aileron
-    was -3.2 deviations in the mean of 12 right fits in air that rolls, -0.3 in test inputs alone.
-    """
-    found = _tested(e, free, range(len(at_trim)))
-    if not found.suspected:
-        return found
-    surfaces = e.found.model.controls()
-    chosen = [
-        k
-        for k, (flown, columns) in enumerate(zip(e.columns.used, e.columns.cuts, strict=True))
-        if not taken_over(columns, flown.found, surfaces)
-    ]
-    commanded = [at_trim[k] for k in chosen]
-    samples, every = (sum(m.samples for m in some) for some in (commanded, at_trim))
-    if samples < LEAST_COMMANDED * every or len(commanded) == len(at_trim):
-        return found
-    again = free_responses(e.found.model, e.estimate, commanded)
-    if again is None:
-        return found
-    alone = _tested(e, again, chosen)
-    return found if alone.suspected else alone
-
-
-def _tested(e: LinearEstimate, free: FreeResponses, chosen: Sequence[int]) -> InputCoherence:
-    """Return the coherence of some maneuvers, beside what their instrument's file leaves open."""
-    used = [e.columns.used[k] for k in chosen]
-    known = [c for c in map(_carriers(e).__getitem__, chosen) if c is not None]
+def _coherence(e: LinearEstimate, free: FreeResponses) -> InputCoherence:
+    """Return what the inputs drive beside the model and what the instrument's file leaves open."""
+    known = [c for c in _carriers(e) if c is not None]
     beside: list[Array] = []
-    if len(known) == len(used):
-        cuts = [e.columns.cuts[k] for k in chosen]
-        beside = systematic_residuals(free.problem, free.theta, cuts, known, e.trim)
+    if len(known) == len(e.columns.used):
+        beside = systematic_residuals(free.problem, free.theta, e.columns.cuts, known, e.trim)
     return input_coherence(free.problem, free.responses, free.theta, beside=beside)
 
 
