@@ -34,7 +34,6 @@ from host.aircraft.airframe import (
 from host.aircraft.attitude import euler
 from host.aircraft.rigid_body import derivative, step
 from host.compiled import compiled_fast
-from host.sysid.aerodynamics.varying_airspeed import VaryingModel
 from host.sysid.models import Maneuver, Trim
 from host.twin.flight import pilot
 
@@ -50,6 +49,7 @@ from studies.gusts import (
     gusty_aircraft,
     program,
 )
+from studies.turning_gusts import TurningModel
 
 BEFORE_S = 60.0  # of gusts, before the aircraft meets them
 TRUTH_EVERY = 10  # samples between two looks at the local derivatives
@@ -76,7 +76,7 @@ def _steady() -> tuple[Airframe, trim.Trim]:
 
 
 @cache
-def varying(axis: str, airspeed_mps: float | None = None) -> VaryingModel:
+def varying(axis: str, airspeed_mps: float | None = None) -> TurningModel:
     """Return the model of one axis with the departures a flight has from it.
 
     Parameters
@@ -92,7 +92,7 @@ def varying(axis: str, airspeed_mps: float | None = None) -> VaryingModel:
     plane = gusty_aircraft(airspeed_mps)
     spin = frame.rotor_inertia_kgm2 * float(steady.state[ROTOR])
     theta = float(euler(steady.state[Q0 : Q0 + 4])[1])
-    return VaryingModel(
+    return TurningModel(
         plane.models[axis],
         axis,
         Trim(plane.airspeed_mps, steady.alpha_rad, theta),

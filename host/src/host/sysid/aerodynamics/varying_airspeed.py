@@ -21,7 +21,6 @@ from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.errors import IdentificationError
-from host.sysid.aerodynamics.gust_reckoning import AXES, gust_motion, turning
 from host.sysid.aerodynamics.left_out_terms import LeftOutTerm, acting_terms
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
@@ -58,18 +57,6 @@ AIRSPEED_TERMS: dict[str, tuple[tuple[str, str], ...]] = {
     "dutch-roll": (),
     "roll": (),
 }
-# States in whose equations a gust that turns with the aircraft appears.
-GUST_TURNING_STATES = {
-    "longitudinal": ("airspeed_mps", "alpha_rad"),
-    "short-period": ("alpha_rad",),
-    "lateral": ("beta_rad",),
-    "dutch-roll": ("beta_rad",),
-    "roll": (),
-}
-# Prior mean and deviation of `gust_turns`: 1 if gusts turn with the aircraft, 0 if they stay with
-# the ground.
-GUST_TURNS_PRIOR = (0.5, 0.5)
-STEADY_SHARE = 0.1  # of the airspeed: deviation of the gust reckoning cannot tell
 
 
 @dataclass(frozen=True)
@@ -132,17 +119,6 @@ class VaryingModel:
     @property
     def model(self) -> LinearModel:
         """The template with the departures as inputs, its own parameters first."""
-        return self._build(turning_air=False)
-
-    @property
-    def gusty(self) -> LinearModel:
-        """The same with ``gust_turns`` and ``gust_x``, ``_y``, ``_z`` (m/s) behind its parameters.
-
-        For filter error, to which the fast part of the gusts is process noise.
-        """
-        return self._build(turning_air=True)
-
-    def _build(self, *, turning_air: bool) -> LinearModel:
         base, scaled = self.base, self.scaled
         second_order, airspeed = SECOND_ORDER_TERMS[self.axis], AIRSPEED_TERMS[self.axis]
         n, m, p = len(base.states), len(base.inputs), len(base.outputs)
@@ -155,8 +131,7 @@ class VaryingModel:
                 terms.append(Term(matrix, term.row, place, term.parameter, term.gain))
         rests = m + len(scaled) + n + len(self.forces)
         beside = rests + len(second_order) + (len(airspeed) > 0)
-        turning_states, gusts = GUST_TURNING_STATES[self.axis], beside + len(self.beside)
-        size = gusts + len(turning_states) * (1 + len(AXES))
+        size = beside + len(self.beside)
         B, D = np.zeros((n, size)), np.zeros((p, size))
         B[:, :m], D[:, :m] = base.B, base.D
         B[:, m + len(scaled) : m + len(scaled) + n] = np.eye(n)
@@ -168,18 +143,6 @@ class VaryingModel:
             terms += acting_terms(base, self.trim, name, row, beside - 1)
         for k, extra in enumerate(self.beside):
             terms += acting_terms(base, self.trim, extra.name, extra.row, beside + k, extra.gain)
-        more: tuple[Parameter, ...] = ()
-        if turning_air:
-            share = STEADY_SHARE * self.trim.airspeed_mps
-            more = (
-                Parameter("gust_turns", GUST_TURNS_PRIOR[0], prior_sd=GUST_TURNS_PRIOR[1]),
-                *(Parameter(f"gust_{axis}", prior_sd=share) for axis in AXES),
-            )
-            # Per row the gust reckoned, behind it the constants it is known but for.
-            for k, row in enumerate(turning_states):
-                first = gusts + k * len(more)
-                at = base.states.index(row)
-                terms += [Term("B", at, first + j, extra.name) for j, extra in enumerate(more)]
         return replace(
             base,
             name=f"{base.name}, airspeed varying",
@@ -191,7 +154,6 @@ class VaryingModel:
                 *base.parameters,
                 *(Parameter(name) for name, *_ in (*second_order, *airspeed)),
                 *(Parameter(t.name) for t in self.beside),
-                *more,
             ),
         )
 
@@ -205,11 +167,6 @@ class VaryingModel:
             *(f"{column} by alpha on {row}" for _, row, column in SECOND_ORDER_TERMS[self.axis]),
             *(("airspeed over its trim",) if AIRSPEED_TERMS[self.axis] else ()),
             *(t.input_name for t in self.beside),
-            *(
-                f"turning {of} on {row}"
-                for row in GUST_TURNING_STATES[self.axis]
-                for of in ("gust", *AXES)
-            ),
         )
 
     def _moving(self, values: Array) -> Array:
@@ -252,7 +209,6 @@ class VaryingModel:
         if AIRSPEED_TERMS[self.axis]:
             inputs.append(self._moving(ratio - 1.0))
         inputs += [self._moving(_deviation(columns[t.column])) for t in self.beside]
-        inputs += self._turning_columns(columns, dt_s)
         outputs = np.column_stack([columns[y] for y in self.base.outputs])
         return Maneuver(dt_s, np.column_stack(inputs), outputs, name=name)
 
@@ -263,13 +219,6 @@ class VaryingModel:
             change = (ratio**power - 1.0) * _deviation(columns[column])
             found.append(change if column in self.base.inputs else self._moving(change))
         return found
-
-    def _turning_columns(self, columns: Mapping[str, Array], dt_s: float) -> list[Array]:
-        """Return, per row that gusts turn, what the gust reckoned and steady ones do there."""
-        gust, steady = gust_motion(columns, dt_s)
-        motions = [gust, *(steady[:, :, k] for k in range(len(AXES)))]
-        turns = [turning(columns, motion) for motion in motions]
-        return [self._moving(turn[row]) for row in GUST_TURNING_STATES[self.axis] for turn in turns]
 
     def _known(self) -> Array:
         """Return kinematics and gravity of the template."""

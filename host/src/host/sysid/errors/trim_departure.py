@@ -6,11 +6,6 @@ lateral fit has N_p 39 %, N_da twofold and L_dr 53 % off by that. What the depar
 (`aerodynamics/varying_airspeed.py`), so the estimate is corrected by one Gauss-Newton step of its
 own method: N_p is then 0.5, N_da 11 and L_dr 5 % off.
 
-A gust that is written in body axes turns with the aircraft: one along the path of 2 % of the
-airspeed makes the angle of attack follow the pitch rate by 2 % more. What is left of the angle is
-then held to be a gust, and where the tail feels gusts M_alpha is 2.7 % off by that. Whether air
-turns so, and by how much, no maneuver tells: intervals count it.
-
 The airspeed is measured, and its noise is in every departure: drawn anew it moves the estimate by
 as much as it has moved it already, and that counts in the covariance.
 
@@ -42,7 +37,6 @@ from host.sysid.aerodynamics.unmeasured_motion import with_unmeasured
 from host.sysid.aerodynamics.varying_airspeed import MEASURED, SECOND_ORDER_TERMS, VaryingModel
 from host.sysid.errors.departure import Departure, expected_beside, with_second_order
 from host.sysid.errors.one_step import CERTAIN_SD, HALF_WAY, OneStep, Step, one_step_of
-from host.sysid.estimators.gust_model import gust_deviation_mps
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
@@ -51,18 +45,11 @@ from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
 from host.sysid.numerics.white_noise import white_deviation
 
-TURNED_ANGLES = ("alpha_rad", "beta_rad")
 REMAINDER_SHARE = 0.25  # of the step: what one step and terms of second order leave open
 DEPARTURES = "departures from the linear model"
 DRAG_POLAR = "curvature of the drag polar"
 THRUST_ACTS = "curvature of the drag polar, and what thrust does"
 LEFT_OUT = "motion that the model leaves out"
-TURNING_AIR = "gust along the path, turning with the aircraft"
-# Deviation of that gust, in the deviation of the gusts found. Near the ground it is 1.3 of theirs
-# (MIL-F-8785C, 3.7.2), the mean over a maneuver less. With 0.5 M_alpha held in 55 of 64 flights of
-# an independent simulator; 1.3 would make intervals in air that stays with the ground five times
-# the rms error.
-TURNING_SHARE = 0.8
 # Of D_alpha_alpha over V Z_alpha, which is 2 C_D_CL2 C_L_alpha of a parabolic polar: 0.3 to 1.
 LARGEST_CURVATURE = 3.0
 NO_SPIN = (0.0, 0.0)
@@ -186,15 +173,12 @@ def correct_trim_departure(
         return None
     moved = result.estimate + found.shares.sum(axis=0)
     noise: Array = np.zeros((len(moved), len(moved)))
-    turned: Array = np.zeros((0, len(moved)))
     if fitted is not None:  # the fit that stands: the rough one before it is measured as it is
         still = one_step.change(departing.model({}), departing.trim, departing.data)
-        turned = _by_turning_air(one_step, result, departing, still)
         noise = _by_airspeed_noise(one_step, result, departing, still)
     open_ones = [
         (DEPARTURES, REMAINDER_SHARE * found.shares.sum(axis=0)),
         *((departing.cause, shift) for shift in _root(found.covariance) @ found.by_added),
-        *((TURNING_AIR, shift) for shift in turned),
     ]
     return departing.found(
         found, [ShiftedEstimate(name, moved + s, 1.0, 1.0) for name, s in open_ones], noise
@@ -231,18 +215,6 @@ def _departing(
         {t.name: beside[t.name][0] for t in thrust},
         _curvature_sd(result, trim),
     )
-
-
-def _by_turning_air(
-    one_step: OneStep, result: FitResult, departing: _Departing, still: Array
-) -> Array:
-    """Return what a gust along the path does that turns with the aircraft, one deviation."""
-    along_mps = gust_deviation_mps(result, departing.trim.airspeed_mps)
-    if along_mps <= 0.0:
-        return np.zeros((0, len(result.estimate)))
-    turning = _with_turning_gust(departing.model({}))
-    moved = one_step.change(turning, departing.trim, departing.data)
-    return np.asarray(TURNING_SHARE * along_mps * (moved - still))
 
 
 def _by_airspeed_noise(
@@ -352,16 +324,6 @@ def _with_airspeed_noise(
         inputs = varying.maneuver({**columns, "airspeed_mps": speed + noise}, maneuver.dt_s).inputs
         noisy.append(replace(maneuver, inputs=inputs))
     return noisy
-
-
-def _with_turning_gust(varying: LinearModel) -> LinearModel:
-    """Return the model with a steady gust of 1 m/s along the path that turns with the aircraft."""
-    B = varying.B.copy()
-    for column, name in enumerate(varying.inputs):
-        row = name.removeprefix("turning x on ")
-        if row in TURNED_ANGLES:
-            B[varying.states.index(row), column] = 1.0
-    return replace(varying, B=B)
 
 
 def spin_of(

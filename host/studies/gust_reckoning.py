@@ -16,7 +16,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 from host.arrays import Array
-from host.sysid.aerodynamics.gust_reckoning import gust_motion, turning
 from host.sysid.estimators import fit
 from scipy.spatial.transform import Rotation
+from studies.gust_reckoning import gust_motion, turning
 from studies.gusts import AXES, DT_S
 from studies.nonlinear_gusts import fly_nonlinear, varying
 from studies.turbulence import PROCESS, fit_both, nonlinear_setup
