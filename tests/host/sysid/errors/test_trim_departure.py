@@ -18,7 +18,7 @@ from host.sysid.errors.trim_departure import spin_of
 from host.sysid.estimators import fit
 from host.sysid.estimators.start_values import regression_estimates, start_values
 from host.sysid.flight import flown_maneuvers, reconstruct_flight
-from host.sysid.linear import gust_at_trim, linear_estimator, linear_fit
+from host.sysid.linear import gust_at_trim, linear_fit
 from host.sysid.linear.linear_model import imu_place_m, without_attitude
 from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import FitResult, Trim, template
@@ -110,25 +110,6 @@ def test_airspeed_that_falls_with_the_rudder_is_not_taken_for_a_derivative(
         assert plain[name] > 0.2, name
         assert moved[name] < 0.35 * plain[name], name
     assert moved["Cn_r"] < 0.05
-
-
-def test_noise_of_the_airspeed_counts_as_far_as_it_scatters_the_estimate(
-    calm: tuple[Columns, list[dict[str, Any]]],
-) -> None:
-    """In calm air it was as large in N_dr as all other noise, and no interval had it."""
-    columns, maneuvers = calm
-    flight = reconstruct_flight(columns, windows(maneuvers), airframe=bare())
-    rng, found, counted = np.random.default_rng(8), [], []
-    for _ in range(6):
-        noise = 0.5 * rng.standard_normal(len(columns["t_s"]))
-        noisy = dict(flight.corrected) | {"airspeed_mps": columns["airspeed_mps"] + noise}
-        estimator = linear_estimator.LinearEstimator("lateral", airframe=bare())
-        estimate = estimator.estimate([replace(flight, corrected=noisy, delays_open=False)])
-        assert estimate.departure is not None
-        k = estimate.fit.index("N_dr")
-        found.append(estimate.estimate[k])
-        counted.append(np.sqrt(estimate.departure.airspeed_noise[k, k]))
-    assert 0.5 < np.std(found, ddof=1) / np.mean(counted) < 1.6
 
 
 def test_equation_error_gives_the_start_though_places_and_delays_are_free(

@@ -31,8 +31,6 @@ class Departure:
     shares : Array, shape (maneuvers, P)
         By how much each maneuver moves the joint estimate.
     remainders : tuple of ShiftedEstimate
-    airspeed_noise : Array, shape (P, P)
-        What the noise of the measured airspeed adds to the covariance.
     varying : VaryingModel
         What makes further inputs of the departures.
     model : LinearModel
@@ -46,7 +44,6 @@ class Departure:
 
     shares: Array
     remainders: tuple[ShiftedEstimate, ...]
-    airspeed_noise: Array
     varying: VaryingModel
     model: LinearModel
     maneuvers: tuple[Maneuver, ...]
@@ -104,7 +101,6 @@ class Departure:
             self,
             shares=np.zeros((len(self.maneuvers), length)),
             remainders=(),
-            airspeed_noise=np.zeros((length, length)),
             model=with_second_order(self.varying.model, self.varying.base, known),
         )
 

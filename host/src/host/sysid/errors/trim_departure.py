@@ -6,9 +6,6 @@ lateral fit has N_p 39 %, N_da twofold and L_dr 53 % off by that. What the depar
 (`aerodynamics/varying_airspeed.py`), so the estimate is corrected by one Gauss-Newton step of its
 own method: N_p is then 0.5, N_da 11 and L_dr 5 % off.
 
-The airspeed is measured, and its noise is in every departure: drawn anew it moves the estimate by
-as much as it has moved it already, and that counts in the covariance.
-
 The drag polar is a parabola in lift; its curvature is estimated along. So is what a reduced
 template leaves out of the other lateral states (`aerodynamics/left_out_terms.py`). Filter error
 with the gust is fitted to what output error says is left without departures, and corrected by what
@@ -37,13 +34,11 @@ from host.sysid.aerodynamics.unmeasured_motion import with_unmeasured
 from host.sysid.aerodynamics.varying_airspeed import MEASURED, SECOND_ORDER_TERMS, VaryingModel
 from host.sysid.errors.departure import Departure, expected_beside, with_second_order
 from host.sysid.errors.one_step import CERTAIN_SD, HALF_WAY, OneStep, Step, one_step_of
-from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.rate_forces import has_rate_forces
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
-from host.sysid.numerics.white_noise import white_deviation
 
 REMAINDER_SHARE = 0.25  # of the step: what one step and terms of second order leave open
 DEPARTURES = "departures from the linear model"
@@ -54,7 +49,6 @@ LEFT_OUT = "motion that the model leaves out"
 LARGEST_CURVATURE = 3.0
 NO_SPIN = (0.0, 0.0)
 LOOSE_SHARE = 10.0  # of the departures, one deviation
-DRAWS = 4  # of the noise of the airspeed, each anew in every maneuver
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +106,7 @@ class _Departing:
         deviations = list(self.along.values())
         return one_step.joint(self.model({}), self.trim, self.data, bends, deviations)
 
-    def found(self, step: Step, open_ones: Sequence[ShiftedEstimate], noise: Array) -> Departure:
+    def found(self, step: Step, open_ones: Sequence[ShiftedEstimate]) -> Departure:
         """Return the departure of a step, and what stays open of it."""
         known = {
             name: self.expected.get(name, 0.0) + float(value)
@@ -121,7 +115,7 @@ class _Departing:
         # What is fitted with thrust has the drag polar beside it.
         polar = {name: (0.0, sd) for name, sd in self.polar.items()} if self.expected else {}
         return Departure(
-            step.shares, tuple(open_ones), noise, self.varying, self.model(known),
+            step.shares, tuple(open_ones), self.varying, self.model(known),
             tuple(self.data), polar | self.beside,
         )  # fmt: skip
 
@@ -172,16 +166,12 @@ def correct_trim_departure(
     if not np.isfinite(found.shares).all():
         return None
     moved = result.estimate + found.shares.sum(axis=0)
-    noise: Array = np.zeros((len(moved), len(moved)))
-    if fitted is not None:  # the fit that stands: the rough one before it is measured as it is
-        still = one_step.change(departing.model({}), departing.trim, departing.data)
-        noise = _by_airspeed_noise(one_step, result, departing, still)
     open_ones = [
         (DEPARTURES, REMAINDER_SHARE * found.shares.sum(axis=0)),
         *((departing.cause, shift) for shift in _root(found.covariance) @ found.by_added),
     ]
     return departing.found(
-        found, [ShiftedEstimate(name, moved + s, 1.0, 1.0) for name, s in open_ones], noise
+        found, [ShiftedEstimate(name, moved + s, 1.0, 1.0) for name, s in open_ones]
     )
 
 
@@ -215,20 +205,6 @@ def _departing(
         {t.name: beside[t.name][0] for t in thrust},
         _curvature_sd(result, trim),
     )
-
-
-def _by_airspeed_noise(
-    one_step: OneStep, result: FitResult, departing: _Departing, still: Array
-) -> Array:
-    """Return what the noise of the measured airspeed adds to the covariance, (P, P)."""
-    data, cuts, straight = departing.data, departing.cuts, departing.model({})
-    deviation_mps = float(white_deviation([c["airspeed_mps"] for c in cuts]))
-    drawn = []
-    for draw in range(DRAWS):
-        noisy = _with_airspeed_noise(departing.varying, data, cuts, deviation_mps, draw)
-        drawn.append(one_step.change(straight, departing.trim, noisy) - still)
-    fitted_too = np.diag(result.covariance) > 0.0  # what the fit left out stays out
-    return consider_covariance(np.vstack(drawn) * fitted_too / np.sqrt(DRAWS))
 
 
 def _guessed_in_vain(
@@ -307,23 +283,6 @@ def _curvature_sd(result: FitResult, trim: Trim) -> dict[str, float]:
         for name, row, _ in SECOND_ORDER_TERMS[result.model.name]
         if row == "airspeed_mps"
     }
-
-
-def _with_airspeed_noise(
-    varying: VaryingModel,
-    data: Sequence[Maneuver],
-    cuts: Sequence[Mapping[str, Array]],
-    deviation_mps: float,
-    draw: int,
-) -> list[Maneuver]:
-    """Return the maneuvers with white noise added to the airspeed once more."""
-    rng, noisy = np.random.default_rng(draw), []
-    for maneuver, columns in zip(data, cuts, strict=True):
-        speed = columns["airspeed_mps"]
-        noise = deviation_mps * rng.standard_normal(len(speed))
-        inputs = varying.maneuver({**columns, "airspeed_mps": speed + noise}, maneuver.dt_s).inputs
-        noisy.append(replace(maneuver, inputs=inputs))
-    return noisy
 
 
 def spin_of(

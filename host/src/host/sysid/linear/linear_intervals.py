@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
 from host.instrument.deviations import airspeed_share, dynamic_pressure_share, unknown_sensors
@@ -80,15 +78,12 @@ def linear_intervals(estimate: LinearEstimate, powerplant: Powerplant | None) ->
 def _statistical(e: LinearEstimate) -> tuple[FitResult, InputCoherence | None]:
     """Return the estimate at its trim, and what the inputs drive beside the model.
 
-    Noise, what the model lacks, and the noise of the airspeed are in its covariance.
+    Noise and what the model lacks are in its covariance.
     """
     at_trim = e.at_trim(e.estimate)  # airspeed that varied is known: what it does is no model error
     free = free_responses(e.found.model, e.estimate, at_trim)
     coherence = None if free is None else _coherence(e, free)
-    of_speed = np.zeros((0, 0)) if e.departure is None else e.departure.airspeed_noise
-    noise = _noise(e, free, coherence)
-    known = _with_model_error(e, noise, noise.plus(of_speed), free, coherence)
-    known = known.plus(of_speed)  # this noise is known, no model error multiplies it
+    known = _with_model_error(e, _noise(e, free, coherence), free, coherence)
     # Our own log is fitted in means, which lean less on what the gust is between samples.
     if others_recorded(e.columns.used):
         known = with_unknown_roll_lag(e.fit.names, e.estimate, known)
@@ -120,15 +115,11 @@ def _noise(
 def _with_model_error(
     e: LinearEstimate,
     noise: Uncertainty,
-    scattering: Uncertainty,
     free: FreeResponses | None,
     coherence: InputCoherence | None,
 ) -> Uncertainty:
-    """Return noise, and what the model lacks by two tests.
-
-    `scattering` is the noise that makes maneuvers disagree.
-    """
-    scatter = maneuver_agreement(e.fit.model.parameter_names, scattering)
+    """Return noise, and what the model lacks by two tests."""
+    scatter = maneuver_agreement(e.fit.model.parameter_names, noise)
     excess = None if free is None else excess_over_noise_model(free, e.fit, e.trim.airspeed_mps)
     return noise.with_model_error(
         [disagreement(scatter), driven_by_inputs(e.fit, noise, coherence, excess)]
