@@ -9,7 +9,6 @@ from host.sysid.estimators.gust_penetration import (
     PREFIX,
     ROLL_LAG,
     with_gust_penetration,
-    with_unknown_roll_lag,
     without_gust_penetration,
 )
 from host.sysid.models import LinearModel, Maneuver, Trim, template
@@ -82,12 +81,6 @@ def test_roll_derivatives_are_right_in_air_that_rolls() -> None:
     found = fit_with_gust(_model(), [_flown(seed)], SPEED_MPS).result
     assert found.method == "filter error with gust"
     half = found.half_width()
-    wider = found.with_uncertainty(
-        with_unknown_roll_lag(found.names, found.estimate, found.uncertainty)
-    )
-    by = dict(zip(found.names, wider.half_width() / half, strict=True))
-    assert 1.05 < by["L_p"] < 2.0  # its pole and that of the gust's lag are told together
-    assert by["N_dr"] < 1.02
     for name in ("L_p", "L_da", "N_beta", "N_r", "N_dr"):
         k = found.index(name)
         error = found.estimate[k] - TRUE[name]

@@ -15,9 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
-from host.sysid.models.uncertainty import Uncertainty
 
 PREFIX = "gust_"
 GUST_LAG = "gust_lag_radps"
@@ -28,9 +26,6 @@ ROLL_STATES = frozenset({"beta_rad", "p_radps"})  # of a model that air may roll
 # (MIL-F-8785C, 3.7.5) of models of 1.2 to 2.5 m span. At the lower end of that range the prior made
 # the lag of the rolling gust 1.8 % quick and L_p 0.5 % small on a trainer of 1.8 m.
 LENGTH_M, ROLL_LENGTH_M, LENGTH_SHARE = 1.5, 2.2, 0.5
-# Of the lag, one deviation: on 29 flights of an independent simulator it came out 5 +- 3 % quick.
-# Without it L_p of others' tables held in 15 of 18 flights, with it in 17.
-ROLL_FORM_SHARE = 0.10
 FARTHEST = 10.0  # times more or less: bounds of the search
 GENEROUS = 2.0  # deviations of the effect, in effects of the same rate and angle of the aircraft
 
@@ -94,24 +89,6 @@ def _lag(name: str, lag: float) -> Parameter:
     return Parameter(
         name, lag, lower=lag / FARTHEST, upper=lag * FARTHEST, prior_sd=LENGTH_SHARE * lag
     )
-
-
-def with_unknown_roll_lag(
-    names: tuple[str, ...], estimate: Array, known: Uncertainty
-) -> Uncertainty:
-    """Return a covariance that counts another lag of the gust that rolls.
-
-    Its lag stands for that of the aircraft's own roll: where both are read from the same noise one
-    may be quicker and the other slower.
-    """
-    if ROLL_LAG not in names:
-        return known
-    k = names.index(ROLL_LAG)
-    if known.variance[k] <= 0.0:
-        return known
-    by = known.covariance[:, k] / known.variance[k]
-    shift = ROLL_FORM_SHARE * estimate[k] * by
-    return known.plus(consider_covariance(shift[None]))
 
 
 def without_gust_penetration(model: LinearModel) -> LinearModel:

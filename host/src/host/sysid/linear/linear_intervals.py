@@ -27,8 +27,6 @@ from host.sysid.errors.systematic_errors import (
     systematic_residuals,
 )
 from host.sysid.estimators.coherence_inflation import driven_by_inputs, widened_to
-from host.sysid.estimators.gust_penetration import with_unknown_roll_lag
-from host.sysid.flight.filter_step import others_recorded
 from host.sysid.linear.linear_stages import LinearEstimate, LinearIntervals
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
@@ -84,9 +82,6 @@ def _statistical(e: LinearEstimate) -> tuple[FitResult, InputCoherence | None]:
     free = free_responses(e.found.model, e.estimate, at_trim)
     coherence = None if free is None else _coherence(e, free)
     known = _with_model_error(e, _noise(e, free, coherence), free, coherence)
-    # Our own log is fitted in means, which lean less on what the gust is between samples.
-    if others_recorded(e.columns.used):
-        known = with_unknown_roll_lag(e.fit.names, e.estimate, known)
     result = replace(
         e.fit,
         estimate=e.estimate,
