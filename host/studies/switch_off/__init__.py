@@ -1,0 +1,1 @@
+"""Every step of identification switched off in turn: which of them improves anything?"""
