@@ -16,9 +16,9 @@ help: ## list the targets
 setup: ## put everything needed into .venv and this clone
 	@.ci/setup.sh
 
-demo: ## fly a virtual flight test through the recorder; compare, decode, identify, draw
+demo: ## fly a virtual flight through the recorder, identify it, open the report (DEMO=--no-open)
 	@.ci/setup.sh demo
-	@$(PYTHON) tests/sitl/virtual_demo.py
+	@$(PYTHON) tests/sitl/virtual_demo.py $(DEMO)
 
 test: setup ## run every test (STAGES="lint native" runs some)
 	@$(PYTHON) .ci/stages.py $(STAGES)

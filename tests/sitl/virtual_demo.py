@@ -1,4 +1,6 @@
-"""`make demo`: fly a virtual aircraft through the recorder, compare, decode, identify, draw.
+"""`make demo`: fly a virtual aircraft through the recorder, decode, identify, open the report.
+
+    make demo DEMO=--no-open
 
 Only verbs a user has. All of it is simulated on this computer. Results stay in build/demo. Exit
 codes: 0 all went well, 6 a step failed or the decoded log is not what the sensors explain.
@@ -6,52 +8,62 @@ codes: 0 all went well, 6 a step failed or the decoded log is not what the senso
 
 from __future__ import annotations
 
+import argparse
+import os
 import subprocess
 import sys
+import webbrowser
+from collections.abc import Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 OUT = Path("build") / "demo"
+PAGE = OUT / "flight.report.html"
 HOST = [sys.executable, "-m", "host"]
+FAILED = 6
+SHOWN = ("losses", "clock", "GPS")  # lines of a step that went well
 
 
-def step(what: str, *arguments: str) -> int:
-    """Say what comes, run one verb, give its exit code."""
-    print(f"demo: {what}", file=sys.stderr)
+def step(*arguments: str, shown: bool = False) -> bool:
+    """Say and run one verb; what it prints is shown whole where that is asked or where it fails."""
     print(f"demo: host {' '.join(arguments)}", file=sys.stderr, flush=True)
-    return subprocess.run([*HOST, *arguments], cwd=ROOT, check=False).returncode
+    if shown:
+        return subprocess.run([*HOST, *arguments], cwd=ROOT, check=False).returncode in (0, 3)
+    ran = subprocess.run(
+        [*HOST, *arguments], cwd=ROOT, check=False, text=True, encoding="utf-8",
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+    )  # fmt: skip
+    lines = ran.stdout.splitlines()
+    few = [line for line in lines if line.startswith(SHOWN)]
+    for line in few if ran.returncode == 0 else lines:
+        print(line, flush=True)
+    return ran.returncode == 0
 
 
-def main() -> int:
-    """Build, fly, decode, identify; 0 if all went well, else 6."""
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Fly, decode, report, open the page; 0 if all went well, else 6."""
+    parser = argparse.ArgumentParser(prog="make demo", description=__doc__)
+    parser.add_argument("--no-open", action="store_true", help="leave the browser alone")
+    asked = parser.parse_args(arguments)
     log, calibration = str(OUT / "flight.bin"), str(OUT / "calibration.toml")
-    print("demo: building the recorder for this computer", file=sys.stderr, flush=True)
     build = [sys.executable, "firmware/toolchain/build_sitl.py"]
     if subprocess.run(build, cwd=ROOT, stdout=subprocess.DEVNULL, check=False).returncode != 0:
-        print("demo: it does not build; the compiler's words stand above", file=sys.stderr)
-        return 6
-    flown = step(
-        "flying a card of doublets and 3-2-1-1s with a virtual aircraft through the recorder",
-        *("simulate", "demo", "-o", str(OUT)),
+        print("demo: the recorder does not build; the compiler's words stand above")
+        return FAILED
+    went_well = (
+        step("simulate", "demo", "-o", str(OUT))
+        and step("decode", log, "--calibration", calibration, "-o", str(OUT / "flight.csv"))
+        and step(
+            *("report", log, "--calibration", calibration, "--aircraft", "ultrastick25e"),
+            *("--truth", str(OUT / "flight.truth.toml"), "-o", str(PAGE)),
+            shown=True,
+        )
     )
-    if flown != 0:
-        return 6
-    decoded = step(
-        "decoding its log as its owner would",
-        *("decode", log, "--calibration", calibration, "-o", str(OUT / "flight.csv")),
-    )
-    if decoded != 0:
-        return 6
-    identified = step(
-        "identifying the aircraft from its log, beside the truth only the simulation knows",
-        *("identify", log, "--calibration", calibration),
-        *("--aircraft", "ultrastick25e", "--truth", str(OUT / "flight.truth.toml")),
-        *("--model", "longitudinal", "--model", "lateral", "--model", "coefficients"),
-        *("--plots", str(OUT / "plots")),
-    )
-    if identified not in (0, 3):
-        return 6
-    print(f"\nLook at {OUT / 'flight.png'} and at the pictures in {OUT / 'plots'}.")
+    if not went_well:
+        return FAILED
+    if not asked.no_open and "CI" not in os.environ and sys.stdout.isatty():
+        webbrowser.open((ROOT / PAGE).as_uri())
+    print(f"Open {PAGE}: the answer, beside the truth that only the simulation knows.")
     return 0
 
 
