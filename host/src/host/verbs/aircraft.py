@@ -68,11 +68,12 @@ def _write(path: Path, given: dict[str, str]) -> None:
 
 
 def _checked(source: str) -> int:
-    from host.aircraft.file import AircraftError, load_measured
+    from host.aircraft.file import AircraftError, load_measured, read_document
     from host.errors import ExitCode
 
     try:
         found = load_measured(source)
+        measured = read_document(source).get("kind") == "measured"
     except AircraftError as error:
         print(f"host: {error}", file=sys.stderr)
         return int(ExitCode.CHECK)
@@ -80,5 +81,6 @@ def _checked(source: str) -> int:
     print(f"{found.title}: {numbers['mass.mass_kg']:g} kg, span {numbers['geometry.span_m']:g} m")
     for doubt in found.doubts:
         print(f"look again: {doubt}")
-    print("good for host identify")
+    less = ": plan, preflight and simulate want aerodynamics, or a file of sizes (START.md, step 8)"
+    print("good for host identify" + (less if measured else ", plan, preflight and live"))
     return int(ExitCode.OK)
