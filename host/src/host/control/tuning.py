@@ -238,7 +238,10 @@ def tune(
         )
         best = design(problem, seed=seed)
         costs = bandwidth_costs(problem, best.gains) if best.gains else []
-        found.append(AxisTuning(problem, best, logged, tuple(costs)))
+        usual = {one.name: one.default for one in problem.structure.settings.values()}
+        # Where no firmware has the gains yet, none was before.
+        before = logged if chosen.words else usual
+        found.append(AxisTuning(problem, best, before, tuple(costs)))
     flown = () if isinstance(source, Sequence) else _airspeeds_mps(source)
     notes = list(_notes(found, chosen, logged, flown))
     yaw = None
