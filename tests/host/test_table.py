@@ -4,10 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.log import read_log
 from host.physical.columns import ANALOGUE, COLUMNS
 from numpy.typing import NDArray
 
 from tests.host.logs import even, flight, read, written
+from tests.protocol.flights import simple_log
 from tests.protocol.log_writer import Timed
 
 COUNT_PER_S = 150.0  # slope of the ramps: 1.5 raw steps per row, within every channel's range
@@ -188,3 +190,11 @@ def test_table_says_its_units(tmp_path: Path) -> None:
     assert list(table.columns) == [column.name for column in COLUMNS]
     assert table.attrs["units"]["qbar_pa"] == "Pa"
     assert table.attrs["calibration"] == "default"
+
+
+def test_a_log_says_in_a_line_what_it_is(tmp_path: Path) -> None:
+    path = tmp_path / "<b>flight.bin"
+    path.write_bytes(simple_log(3.0).data())
+    log = read_log(path)
+    assert "300 rows, complete, nothing lost" in repr(log)
+    assert "&lt;b&gt;" in log._repr_html_() and "<b>" not in log._repr_html_()

@@ -51,3 +51,7 @@ __getattr__ = lazily(
         "tune": "control.tuning",
     },
 )
+
+
+def __dir__() -> list[str]:
+    return __all__

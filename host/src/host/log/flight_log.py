@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from host.physical.columns import CHANNELS, COLUMNS
 from host.physical.session import Session, surface_sources
 from host.physical.table import Columns, SessionTable
 from host.physical.timebase import ClockFit, block_times_us, fit_gps, gps_times_ms, session_slices
+from host.text import shown
 from host.wire.blocks import Progress, Scan
 from host.wire.schema import Schema
 from host.wire.selection import Selection
@@ -153,6 +155,20 @@ class FlightLog:
     def complete(self) -> str:
         """``complete``, ``truncated`` or ``damaged`` (protocol/README.md, "End")."""
         return self.loss.complete
+
+    def __repr__(self) -> str:
+        """Return in a line what the log is."""
+        rows = sum(session.rows for session in self.sessions)
+        seconds = sum(session.duration_s for session in self.sessions)
+        lost = sum(loss.ranges for loss in self.loss.losses)
+        losses = f"{lost} lost range{'s' * (lost > 1)}" if lost else "nothing lost"
+        return (
+            f"<FlightLog {shown(self.path.name)}: {seconds:.1f} s, {rows} rows, {self.complete},"
+            f" {losses}, calibration {shown(self.calibration.name)}>"
+        )
+
+    def _repr_html_(self) -> str:
+        return f"<p>{escape(repr(self)[1:-1])}</p>"
 
     def table(self, *, aligned: bool = True) -> pd.DataFrame:
         """Return the synchronous table in SI at the identification rate.
