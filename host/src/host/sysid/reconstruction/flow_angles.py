@@ -20,8 +20,8 @@ from host.arrays import Array
 from host.constants import GRAVITY_MPS2, NORMAL_95
 from host.errors import IdentificationError
 from host.sysid.reconstruction.flight_path import GPS, WITH_GPS
-from host.sysid.reconstruction.gps_fixes import gps_fixes
 from host.sysid.reconstruction.linear_smoother import Step, smooth
+from host.sysid.reconstruction.path_preparation import gps_fixes
 from host.sysid.reconstruction.reconstruction import Compatibility
 from host.sysid.reconstruction.strapdown import rotation, rotation_from_vector
 

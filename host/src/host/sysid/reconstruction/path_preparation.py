@@ -35,7 +35,6 @@ from host.sysid.reconstruction.flight_path import (
     PathProblem,
     Segment,
 )
-from host.sysid.reconstruction.gps_fixes import gps_fixes
 from host.sysid.reconstruction.position_correction import transfer_to_cg
 from host.sysid.reconstruction.strapdown import rotation
 
@@ -60,6 +59,7 @@ SPEED_SMOOTH_S = 0.25  # half a window: one count of the pitot is 1.4 % of trim 
 SMOOTHED = "airspeed_mps smoothed"
 NO_OFFSETS = AirframeData("nothing but places", 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0)
 FLYING_SHARE = 0.5  # of the median airspeed
+FIX_BEND_MPS = 1e-6
 # Not in any calibration: deviation of the steady wind, mean and deviation of delays.
 WIND_SD_MPS = 10.0
 VANE_DELAY_S = (0.010, 0.010)
@@ -119,6 +119,15 @@ def _fixes(data: Mapping[str, Array], gps: bool, cuts: Sequence[slice]) -> BoolA
         for cut in cuts:
             result[cut] = fixes[cut] & (np.sum(fixes[cut]) >= FEWEST_FIXES)
     return result
+
+
+def gps_fixes(data: Mapping[str, Array]) -> BoolArray:
+    """Return which samples are GPS fixes: between them a decoded table is linear."""
+    bend = sum(np.abs(np.diff(data[name], n=2)) for name in GPS)
+    bend = np.concatenate([[0.0], bend, [0.0]])
+    known = bend > FIX_BEND_MPS
+    peak = (bend >= np.roll(bend, 1)) & (bend > np.roll(bend, -1))
+    return np.asarray(known & peak)
 
 
 def _outputs(columns: Mapping[str, Array]) -> tuple[str, ...]:
