@@ -243,7 +243,7 @@ state_biases = { alpha_rad = 0.36, q_radps = 4.8 }
 noise = { alpha_rad = 2e-4, q_radps = 2e-4 }
 """
     )
-    found = host.identify(pitching, models=path)
+    found = host.identify(pitching, models=path, from_s=float(pitching["t_s"].iloc[0]))
     held(found, SHORT_PERIOD)
     text = found.to_text()
     assert (
