@@ -20,12 +20,12 @@ def simulation_lines(one: Simulation, source: str, *, constants: bool) -> list[s
             *_free_lines(m),
             *_one_step_lines(m),
             *_window_lines(m),
-            f"  {verdict(m)}",
+            f"  {_in_words(m)}",
         ]
     return lines
 
 
-def verdict(m: SimulatedModel) -> str:
+def _in_words(m: SimulatedModel) -> str:
     """Return in a sentence what the model is worth on this record, by its free simulation.
 
     A signal is not predicted where who says its mean errs less.
