@@ -98,10 +98,10 @@ def test_a_place_that_is_none_is_refused_before_the_flight_is_read(
     monkeypatch.chdir(tmp_path)
     Path("FILE").write_text("x")
     Path("FOLDER.mat").mkdir()
-    # The source does not exist: the place is looked at first.
+    Path("none.csv").write_text("no table")  # the place is looked at first
     assert main(["identify", "none.csv", *options]) == 2
     assert words in line()
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["FILE", "FOLDER.mat"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["FILE", "FOLDER.mat", "none.csv"]
 
 
 def test_an_output_does_not_replace_what_it_is_made_from(
