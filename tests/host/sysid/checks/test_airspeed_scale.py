@@ -9,8 +9,11 @@ import pytest
 from host.instrument.deviations import SensorErrorModel, unknown_sensors
 from host.physical.calibration import load_calibration
 from host.physical.recording import FOREIGN, Recording
+from host.readers.even_grid import even_columns
 from host.sysid.answer import TRUSTED
 from host.sysid.checks.airspeed_scale import CERTAIN, CHECK, airspeed_scale, airspeed_scale_findings
+from host.sysid.pipeline import at_hand, identify_columns
+from host.twin.virtual import virtual_flight
 from studies.foreign.flight import Air
 from studies.foreign.instrument import SENSORS_FILE, Columns, with_sensor_errors
 from studies.independent import cells, flown, identified
@@ -90,3 +93,11 @@ def test_nothing_is_under_trust_by_an_airspeed_that_is_not_its_files() -> None:
     marks = [mark for verdict in answer.verdicts for mark in verdict.marks.values()]
     assert len(marks) > 20
     assert TRUSTED not in marks
+
+
+def test_with_gps_the_flight_path_tells_the_scale() -> None:
+    """Seed 9 of the twin: right within 2 %, and read as 10 % low by forces alone in its gusts."""
+    columns, _ = even_columns(virtual_flight("demo", 9).table)
+    found = identify_columns(at_hand(columns, aircraft="ultrastick25e"), models="longitudinal")
+    assert CHECK not in [finding.check for finding in found.findings]
+    assert found.table["verdict"]["longitudinal", "M_alpha"] == TRUSTED

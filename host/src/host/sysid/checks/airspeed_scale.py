@@ -2,9 +2,8 @@
 
 A force along an axis turns the wind angle by itself over the airspeed: an airspeed that reads 10 %
 high makes the force count 10 % too little. `driven_motion` tells the factor by what surfaces drive:
-to 1 % in calm air, to 5 and 9 % in gusts of 0.5 and 1 m/s. With GPS flight-path reconstruction
-knows the speed too; without, nothing else does, and coefficients of a flight whose file claimed 1 %
-were 8 to 20 % off, under trust.
+to 1 % in calm air, to 5 and 9 % in gusts of 0.5 and 1 m/s. It is asked without GPS only: with it
+flight-path reconstruction tells the scale, without nothing else does.
 """
 
 from __future__ import annotations

@@ -119,7 +119,7 @@ def prepare(given: FlightAtHand) -> PreparedFlight:
         *fed_back,
         *agreed.findings,
         *no_vanes_finding(columns, reconstructed=reconstructed),
-        *(airspeed_scale_findings(flight.corrected, instrument) if instrument else ()),
+        *_airspeed_findings(flight.corrected, instrument, agreed.found),
     ]
     findings, unused = blamed(findings, how.equations)
     flight = replace(
@@ -143,6 +143,17 @@ def prepare(given: FlightAtHand) -> PreparedFlight:
     given_twice = overlap_notes(how.stretches)
     said = (*read.notes, *travel, *open_notes, *given_twice, *agreed.notes, *line, *unused)
     return PreparedFlight(flight, agreed.found, said, agreed.unchecked)
+
+
+def _airspeed_findings(
+    corrected: Mapping[str, Array],
+    instrument: SensorErrorModel | None,
+    agreement: Compatibility | None,
+) -> list[Finding]:
+    """Return whether forces contradict the airspeed, where no GPS has told its scale already."""
+    if instrument is None or (agreement is not None and agreement.gps):
+        return []
+    return airspeed_scale_findings(corrected, instrument)
 
 
 def _sensors(given: FlightAtHand, instrument: SensorErrorModel | None) -> SensorErrorModel:
