@@ -1,0 +1,25 @@
+"""The API page of `make docs` names everything that `import host` offers, where it is defined."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from pathlib import Path
+
+import host
+
+SITE = Path(__file__).resolve().parents[2] / ".ci" / "docs" / "site.py"
+
+
+def test_every_name_of_the_package_has_its_docstring() -> None:
+    spec = importlib.util.spec_from_file_location("site_of_pages", SITE)
+    assert spec is not None and spec.loader is not None
+    site = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(site)
+    shown = [line.removeprefix("::: ") for line in site.api_page().splitlines() if ":::" in line]
+    assert sorted(place.rpartition(".")[2] for place in shown) == sorted(
+        name for name in host.__all__ if name != "__version__"
+    )
+    for place in shown:
+        module, _, name = place.rpartition(".")
+        assert getattr(importlib.import_module(module), name).__doc__
