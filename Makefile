@@ -1,6 +1,6 @@
 # Two commands: `make demo` and `make test`. Both set up what they need first.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test native mega sitl lint format bench study judgement tune-bench fleet-bench live-bench flight-bench imu-bench faults power-cuts card-images fuzz mutants hw clean docs input-flights ideas ground-triggers
+.PHONY: help setup demo test native mega sitl lint format bench study judgement tune-bench fleet-bench live-bench flight-bench imu-bench faults power-cuts card-images fuzz mutants hw clean docs release input-flights ideas ground-triggers
 PYTHON := .venv/bin/python
 PIO := .venv/bin/pio
 # Runs a module of tests/chip in that folder; what it imports lies elsewhere.
@@ -25,6 +25,9 @@ test: setup ## run every test (STAGES="lint native" runs some)
 
 docs: ## pages as a searchable site, with the API from the docstrings: build/docs/site
 	@python3 .ci/docs/site.py
+
+release: setup ## wheel, images of both compilers, list of parts and hashes: build/release
+	@$(PYTHON) .ci/release.py
 
 native: setup ## unit tests of the firmware on this computer
 	@$(PIO) test -e native
