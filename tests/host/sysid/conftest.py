@@ -28,9 +28,12 @@ def known_sensors(maker: str, calibration: Calibration | None = None) -> Instrum
     return errors.scaled(0.01, *(e.name for e in errors if e.name not in kept))
 
 
-@pytest.fixture(scope="package", autouse=True)
+@pytest.fixture(scope="module", autouse=True)
 def sensors_without_errors() -> Iterator[None]:
-    """Stand in for the errors of an aircraft without a file: tests/host/instrument has those."""
+    """Stand in for the errors of an aircraft without a file: tests/host/instrument has those.
+
+    A package that is none for Python would keep it for all tests that come later.
+    """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("host.instrument.deviations.errors_without_file", known_sensors)
         yield

@@ -66,7 +66,8 @@ def test_a_method_that_does_not_settle_has_no_history(
     assert identified(table, "equation-error", "--history", str(path)) == 2
     assert "no method here notes how it settles" in capsys.readouterr().err
     assert not path.exists()
-    # Said before the work: this table is not even there.
+    # Said before the work: this is not even a table.
+    (tmp_path / "gone.csv").write_text("no table")
     gone, options = (
         str(tmp_path / "gone.csv"),
         ("--method", "equation-error", "--method", "genetic"),
