@@ -70,7 +70,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--to", dest="to_s", type=float, metavar="S", help="end of the picture")
 
 
-def flight_request(args: argparse.Namespace) -> Any:
+def flight_request(args: argparse.Namespace, mapping: Path | None = None) -> Any:
     """Return what `add_log_arguments` was given as `host.report.flight_reading.FlightRequest`."""
     from host.readers.autopilot_flight import log_choices
     from host.report.flight_reading import FlightRequest
@@ -81,7 +81,7 @@ def flight_request(args: argparse.Namespace) -> Any:
         file_id=args.file_id,
         calibration=args.calibration,
         row_rate_hz=args.row_rate,
-        mapping=getattr(args, "map", None),
+        mapping=mapping,
         sensors=tuple(log_choices(args.sensor, args.outputs).items()),
     )
 
@@ -115,7 +115,9 @@ def _plot(args: argparse.Namespace) -> Any:
     strips = tuple(one for one in args.channels.split(",") if one)
     span = (args.from_s, args.to_s)
     return plot(
-        PlotRequest(flight_request(args), args.output, args.full, _pictures(args), strips, span)
+        PlotRequest(
+            flight_request(args, args.map), args.output, args.full, _pictures(args), strips, span
+        )
     )
 
 
@@ -124,7 +126,7 @@ def _bode(args: argparse.Namespace) -> Any:
     from host.report.frequency_plotting import FrequencyRequest, plot_frequency
     from host.sysid.pipeline.arguments import option_words
 
-    wanted = flight_request(args)
+    wanted = flight_request(args, args.map)
     models = tuple(args.model)
     try:
         return plot_frequency(
