@@ -137,8 +137,8 @@ def test_a_report_of_an_input(name: str, monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_two_surfaces_that_are_exchanged() -> None:
-    """Nothing of what the aileron does stands under trust."""
+    """What the aileron does is refused, and usable where each column is its own."""
     answer = identified("aileron_rudder_swapped.csv", ())
     control = identified(TABLE, ())
     marks = [one["answers"][0]["marks"]["L_da"]["mark"] for one in (answer, control)]
-    assert marks == ["do not use", "trust"]
+    assert marks == ["do not use", "use with care"]
