@@ -6,7 +6,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from host.live import live_program, live_request, live_sources
 from host.live.live_session import LiveSession
 from host.live.live_sources import PortSource, UdpSource, choose_radio
 from host.live.live_stream import LiveStream
+from host.live.replay import ReplaySource
 from host.log import read_log
 from host.log.capture_head import read_capture_head
 from host.physical.calibration import load_calibration
@@ -283,23 +284,40 @@ def test_frames_before_the_first_hash_are_decoded_with_it() -> None:
     assert rows == ROWS
 
 
-def heights(portion: int, data: bytes) -> list[float]:
+def heights(portions: Iterable[bytes]) -> list[float]:
     stream = LiveStream(load_calibration())
-    updates = (stream.feed(data[at : at + portion], 0.0) for at in range(0, len(data), portion))
+    updates = (stream.feed(portion, 0.0) for portion in portions)
     return [one for update in updates for one in update.rows.get("altitude_m", np.empty(0))]
 
 
-def test_a_row_has_the_pressure_before_it_in_portions_of_any_size() -> None:
+def by_udp(datagrams: list[bytes]) -> Iterator[bytes]:
+    source = UdpSource("127.0.0.1", 0).open()
+    assert source._listener is not None
+    place = source._listener.getsockname()
+    portions = source.portions(lambda _: None)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for datagram in datagrams:
+            sender.sendto(datagram, place)
+            yield next(portions)
+
+
+def test_a_row_has_the_pressure_before_it_by_file_by_udp_and_in_any_portions(
+    tmp_path: Path,
+) -> None:
     streams = flight(6.0)
     baro = next(one for one in streams if "static_pressure" in (one.rows.dtype.names or ()))
     # 16 m of climb in 6 s, in steps of the sensor's own.
     baro.rows["static_pressure"] = np.linspace(16 * 101_000, 16 * 100_800, len(baro.rows))
     data = joined(as_sent(streams, 6.0))
-    whole = heights(len(data), data)
+    whole = heights([data])
     assert len(whole) == ROWS
     assert np.nanmax(whole) - np.nanmin(whole) == pytest.approx(16.0, abs=1.5)
-    for portion in (1, 500):
-        np.testing.assert_array_equal(heights(portion, data), whole)
+    cut = {n: [data[at : at + n] for at in range(0, len(data), n)] for n in (1, 500)}
+    capture = tmp_path / "flight.radio"
+    capture.write_bytes(data)
+    played = ReplaySource(capture, speed=np.inf).portions(lambda _: None)
+    for portions in (cut[1], cut[500], by_udp(cut[500]), played):
+        np.testing.assert_array_equal(heights(portions), whole)
 
 
 @pytest.mark.parametrize("row", [APPENDIX, SECOND], ids=["original", "ours and the second"])

@@ -76,10 +76,11 @@ ESTIMATES = """(async () => {
     showEstimates({ ...said(known), next }, hasCard);
     return document.getElementById("estimates-next").innerText.split(":")[0];
   });
-  const { History } = await import("./history.js");
-  const compass = new History(["t_s", "psi_deg"], 30);
-  const heading = compass.drawn("psi_deg", -90, 1);
-  return { ...shown, called, heading };
+  const { compass } = await import("./plan.js");
+  const { PLOTS } = await import("./channels.js");
+  const unit = ([column]) => column.split("_").pop();
+  const units = PLOTS.map(({ series }) => new Set(series.map(unit)).size);
+  return { ...shown, called, heading: [-90, 359.7, 725].map(compass), units: Math.max(...units) };
 })()"""
 
 
@@ -158,7 +159,9 @@ def look(live: ServedPage, folder: Path) -> None:
         assert page.console_errors == []
         told = page.evaluate(ESTIMATES)
         assert (told["first"], told["more"], told["hidden"]) == (True, True, False), told
-        assert (told["called"], told["heading"]) == (["after the card", "next"], 270), told
+        assert told["called"] == ["after the card", "next"]
+        assert told["heading"] == [270, 0, 5]
+        assert told["units"] == 1  # of a strip
         assert told["head"] == "2 of 3 enough"
         assert [("enough" in line, line.split()[0]) for line in told["lines"]] == [
             (True, "Cm"), (True, "Cn"), (False, "Cl"),

@@ -81,6 +81,7 @@ class FlightState:
                 "damaged_bytes": self._stream.damaged_bytes,
             },
             "system": self._system(),
+            "switch_us": self._switch_us(),
             "gps": self._gps(),
             "who": self._who(),
             "jumps": dict(self.servos.jumps),
@@ -163,6 +164,10 @@ class FlightState:
             "drive": said["drive"],
             "uptime_s": said["uptime_s"],
         }
+
+    def _switch_us(self) -> int | None:
+        value = self._row.get("rc_switch_us", math.nan)
+        return round(value) if math.isfinite(value) else None
 
     def _gps(self) -> dict[str, Any]:
         frame, schema = self._last.get("gps"), self._stream.schema

@@ -105,6 +105,7 @@ class LiveSession:
 
     def start(self) -> None:
         """Begin to receive."""
+        self.beat_s = time.monotonic()
         self.recorder.start()
         self._thread.start()
 

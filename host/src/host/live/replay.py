@@ -18,6 +18,7 @@ from host.log import FlightLog, read_log
 from host.original.rows import looks_like_rows
 from host.physical.calibration import load_calibration
 from host.wire.framing import SCHEMA_HASH_ID, envelope
+from host.wire.stream import Stream
 
 RADIO_RATE_HZ = 20.0
 _HASH_S = 5.0
@@ -40,7 +41,7 @@ class ReplaySource:
     speed : float
         Flight seconds per second; infinite as fast as it is decoded.
     rate_hz : float
-        Identification frames a second, as far as the recording has them.
+        Identification frames a second of a log of the card; a capture is played as received.
     """
 
     path: Path
@@ -58,7 +59,7 @@ class ReplaySource:
 
     def portions(self, tell: Tell) -> Iterator[bytes]:
         """Yield what the radio would have sent; ends with the recording."""
-        parts = self._text() if self._is_text() else self._timed(read_log(self.path))
+        parts = self._text() if self._is_text() else self._parts(read_log(self.path))
         start_s = yielded_s = time.monotonic()
         gathered = bytearray()
         for at_s, data in parts:
@@ -86,6 +87,9 @@ class ReplaySource:
         step = 64
         for at in range(0, len(data), step):
             yield (at + step) / _TEXT_BYTES_PER_S, data[at : at + step]
+
+    def _parts(self, log: FlightLog) -> Iterator[tuple[float, bytes]]:
+        return self._timed(log) if log.stream is None else _as_received(log.stream)
 
     def _timed(self, log: FlightLog) -> Iterator[tuple[float, bytes]]:
         """Yield seconds since the first row and an envelope, in order."""
@@ -131,6 +135,20 @@ class ReplaySource:
         if name == "ident":
             return 0.9 / self.rate_hz
         return _LEAST_S.get(name, 0.0)
+
+
+def _as_received(stream: Stream) -> Iterator[tuple[float, bytes]]:
+    """Yield seconds and bytes of a capture in the order in which they came, damage included."""
+    blocks = stream.blocks
+    # Clocks wrap; a reset takes no time.
+    step_us = np.diff(blocks.first_t_us, prepend=blocks.first_t_us[:1]).astype(np.int32)
+    step_us[np.diff(blocks.session, prepend=blocks.session[:1]) != 0] = 0
+    at_s = np.maximum.accumulate(np.cumsum(step_us, dtype=np.int64)) * 1e-6
+    ends = [*blocks.position[1:].tolist(), len(stream.data)]
+    begin = 0
+    for at, end in zip(at_s.tolist(), ends, strict=True):
+        yield at, stream.data[begin:end]
+        begin = end
 
 
 def replay_source(text: str, rate_hz: float) -> ReplaySource:

@@ -1,11 +1,13 @@
-// What is plotted together: title, unit, least span of the axis, and series of column, label, colour
-// (and unit, where it has an axis of its own that is not drawn). `times`: the last row of the page.
+// What is plotted together: title, unit, least span of the axis, and series of column, label, colour.
+// A strip has one unit. `times`: the last row of the page.
 
 const LEFT = "#0b3d91"; // left vane and pitot, stick, x axis
 const RIGHT = "#c43b00"; // right vane and pitot, servo, y axis
-const THIRD = "#00642c"; // measured surface, z axis
+const THIRD = "#00642c"; // z axis
+const FOURTH = "#6a1b9a";
 
-function surface(name, pots) {
+// What the pilot asks for and what the servo is told; where the surface stands is a strip of its own.
+function pulses(name) {
   return {
     id: name,
     title: name,
@@ -16,13 +18,12 @@ function surface(name, pots) {
     series: [
       [`rc_${name}_us`, "stick", LEFT],
       [`servo_${name}_us`, "servo", RIGHT],
-      ...pots.map(([column, label]) => [column, label, THIRD, "deg"]),
     ],
   };
 }
 
 export const PLOTS = [
-  surface("elevator", [["elevator_pot_deg", "pot"]]),
+  pulses("elevator"),
   {
     id: "alpha",
     title: "alpha",
@@ -40,7 +41,7 @@ export const PLOTS = [
     digits: 0,
     series: [["p_degps", "p", LEFT], ["q_degps", "q", RIGHT], ["r_degps", "r", THIRD]],
   },
-  surface("aileron", [["aileron_left_deg", "L"], ["aileron_right_deg", "R"]]),
+  pulses("aileron"),
   {
     id: "beta",
     title: "beta",
@@ -58,7 +59,7 @@ export const PLOTS = [
     digits: 0,
     series: [["phi_deg", "roll", LEFT], ["theta_deg", "pitch", RIGHT]],
   },
-  surface("rudder", [["rudder_pot_deg", "pot"]]),
+  pulses("rudder"),
   {
     id: "airspeed",
     title: "airspeed",
@@ -76,7 +77,7 @@ export const PLOTS = [
     digits: 1,
     series: [["ax_mps2", "x", LEFT], ["ay_mps2", "y", RIGHT], ["az_mps2", "z", THIRD]],
   },
-  { ...surface("throttle", []), times: true },
+  { ...pulses("throttle"), times: true },
   {
     id: "altitude",
     times: true,
@@ -87,12 +88,17 @@ export const PLOTS = [
     series: [["altitude_m", "pressure", LEFT]],
   },
   {
-    id: "heading",
+    id: "surfaces",
     times: true,
-    title: "heading",
+    title: "surfaces",
     unit: "deg",
-    span: 40,
-    digits: 0,
-    series: [["psi_deg", "heading", LEFT], ["rc_switch_us", "switch", THIRD, "us"]],
+    span: 10,
+    digits: 1,
+    series: [
+      ["elevator_pot_deg", "E", LEFT],
+      ["aileron_left_deg", "AL", RIGHT],
+      ["aileron_right_deg", "AR", FOURTH],
+      ["rudder_pot_deg", "R", THIRD],
+    ],
   },
 ];

@@ -1,6 +1,5 @@
 // The last seconds of every column, as arrays that uPlot draws: null where there is no value.
 
-const TURN_S = 0.25; // wider than a pixel
 const SPARE = 2; // times the window, before what is older is thrown away
 
 function thinned(column, start, few, isTime) {
@@ -42,8 +41,8 @@ export class History {
       const at = 2 + row * width;
       if (this.lastT !== null && numbers[at] < this.lastT - 5) this.clear();
       for (let column = 0; column < width; column += 1) {
-        const name = this.columns[column];
-        this.values.get(name).push(this.drawn(name, numbers[at + column], numbers[at]));
+        const given = numbers[at + column];
+        this.values.get(this.columns[column]).push(Number.isFinite(given) ? given : null);
       }
       this.lastT = numbers[at];
     }
@@ -51,17 +50,6 @@ export class History {
     if (this.arrived.length > 1000) this.arrived.shift();
     this.lastAt = performance.now();
     this.forget();
-  }
-
-  // What is drawn of a value: nothing where there is none. The heading is that of a compass, 0 to 360;
-  // across north, where a turn is no step, nothing is drawn either.
-  drawn(name, given, t) {
-    if (!Number.isFinite(given)) return null;
-    if (name !== "psi_deg") return given;
-    const value = ((given % 360) + 360) % 360;
-    if (Math.abs(value - this.heading) > 180) this.turnedAt = t;
-    this.heading = value;
-    return t - this.turnedAt < TURN_S ? null : value;
   }
 
   clear() {

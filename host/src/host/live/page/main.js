@@ -100,8 +100,9 @@ function tell() {
   byId("airspeed").textContent = pair.length ? (pair.reduce((a, b) => a + b) / pair.length).toFixed(1) : "-";
   const points = plan.points;
   byId("height").textContent = points.length ? points[points.length - 1][2].toFixed(0) : "-";
-  byId("plan-text").textContent = plan.text();
-  plan.draw(history.last("psi_deg"));
+  const heading = history.last("psi_deg");
+  byId("plan-text").textContent = plan.text(heading);
+  plan.draw(heading);
 }
 
 function redraw() {

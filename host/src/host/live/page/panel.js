@@ -46,6 +46,7 @@ function showFacts(state, link, system) {
   fact(list, "not sent by radio", system.not_sent ?? "-");
   fact(list, "card: dropped, errors", `${system.frames_dropped ?? "-"}, ${system.card_errors ?? "-"}`, system.frames_dropped > 0 || system.card_errors > 0);
   fact(list, "servos by", system.drive ?? "-");
+  fact(list, "switch", state.switch_us === null ? "-" : `${state.switch_us} us`);
   fact(list, "heard of", (system.sensors ?? []).join(", ") || "-");
   list.lastChild.className = "long";
   fact(list, "aircraft", state.who.aircraft || "-");

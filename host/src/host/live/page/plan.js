@@ -1,5 +1,8 @@
 // The track from above, metres east and north of home: no tiles, so nothing is missing in the field.
 
+// Heading of a compass, 0 to 360, of any number of turns.
+export const compass = (degrees) => ((Math.round(degrees) % 360) + 360) % 360;
+
 const TRACK = "#0b3d91";
 const MOST = 3000;
 const STEPS = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
@@ -131,9 +134,10 @@ export class Plan {
     pen.fillText(`wind ${speed.toFixed(0)} m/s`, width - 6, 74);
   }
 
-  text() {
+  text(heading) {
     if (!this.points.length) return "no position";
-    const [x, y, height] = this.points[this.points.length - 1];
-    return `${Math.hypot(x, y).toFixed(0)} m from home, ${height.toFixed(0)} m up`;
+    const [x, y] = this.points[this.points.length - 1];
+    const pointed = heading === null ? "" : `heading ${compass(heading)}, `;
+    return `${pointed}${Math.hypot(x, y).toFixed(0)} m from home`;
   }
 }

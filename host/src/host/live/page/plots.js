@@ -46,10 +46,10 @@ class Plot {
     this.end = null; // of the window as it is drawn, s
     this.made = 0; // rows that are drawn
     this.columns = what.series.map(([column]) => column);
-    const box = element("section", what.jumps ? "plot surface" : "plot");
+    const box = element("section", "plot");
     box.setAttribute("aria-label", what.title);
     const heading = element("h2", "", what.title);
-    if (!what.jumps) heading.append(element("small", "", what.unit));
+    heading.append(element("small", "", what.unit));
     const values = element("span", "values");
     this.values = what.series.map(([, label, colour]) => {
       const one = element("span", "");
@@ -62,18 +62,14 @@ class Plot {
     });
     const extra = element("span", what.jumps ? "jumps" : "");
     this.extra = element("b", "", "-");
-    if (what.difference) {
-      extra.append("L-R ", this.extra);
+    if (what.difference || what.jumps) {
+      extra.append(what.jumps ? "jumps " : "L-R ", this.extra);
       values.append(extra);
     }
     values.title = what.series.map(([column]) => column).join(", ");
     heading.append(values);
     this.canvas = element("div", "canvas");
     this.canvas.setAttribute("role", "img");
-    if (what.jumps) {
-      extra.append("jumps ", this.extra);
-      this.canvas.append(extra);
-    }
     box.append(heading, this.canvas);
     parent.append(box);
     this.chart = new uPlot(this.options(), [[], ...this.columns.map(() => [])], this.canvas);
@@ -81,14 +77,11 @@ class Plot {
   }
 
   options() {
-    const scales = { x: { time: false, auto: false, range: () => this.span || [0, 30] } };
-    for (const [, , , unit] of this.what.series) {
-      const name = unit || this.what.unit;
-      if (!scales[name]) {
-        const range = ranger(unit ? (unit === "us" ? 200 : 10) : this.what.span);
-        scales[name] = { auto: true, range: (_, least, most) => range(least, most) };
-      }
-    }
+    const range = ranger(this.what.span);
+    const scales = {
+      x: { time: false, auto: false, range: () => this.span || [0, 30] },
+      y: { auto: true, range: (_, least, most) => range(least, most) },
+    };
     return {
       width: 200,
       height: 80,
@@ -101,16 +94,16 @@ class Plot {
         { scale: "x", stroke: AXIS, grid: GRID, font: FONT, size: this.what.times ? 16 : 4, gap: 1,
           ticks: { show: false }, space: 80,
           values: (_, ticks) => ticks.map((tick) => (this.what.times ? `${Math.round(tick)}` : "")) },
-        { scale: this.what.unit, stroke: AXIS, grid: GRID, font: FONT, size: 36, gap: 2,
+        { scale: "y", stroke: AXIS, grid: GRID, font: FONT, size: 36, gap: 2,
           ticks: { show: false }, space: 26, values: (_, ticks) => ticks.map(String) },
       ],
       series: [
         {},
-        ...this.what.series.map(([, label, stroke, unit]) => ({
+        ...this.what.series.map(([, label, stroke]) => ({
           label,
           stroke,
           width: 1.6,
-          scale: unit || this.what.unit,
+          scale: "y",
           points: { show: false },
           spanGaps: false,
         })),
@@ -181,9 +174,9 @@ class Plot {
 
   say(history, jumps) {
     const { digits, series, difference } = this.what;
-    series.forEach(([column, , , unit], at) => {
+    series.forEach(([column], at) => {
       const value = history.last(column);
-      set(this.values[at], value === null ? "-" : value.toFixed(unit === "deg" ? 1 : digits));
+      set(this.values[at], value === null ? "-" : value.toFixed(digits));
     });
     if (difference) {
       const [left, right] = difference.map((column) => history.last(column));
