@@ -1,7 +1,7 @@
-"""Make the bill of materials: what is bought, counted in schematic, harness and mechanics.
+"""Make the bill of materials and the page of the light variant: what is bought, what it weighs.
 
-python hw/generate_bom.py           write bom.csv
-python hw/generate_bom.py --check   prove that it is current
+python hw/generate_bom.py           write bom.csv and generated/LIGHT.md
+python hw/generate_bom.py --check   prove that they are current
 """
 
 from __future__ import annotations
@@ -12,12 +12,14 @@ import io
 import sys
 import tomllib
 from collections import defaultdict
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 HERE = Path(__file__).resolve().parent
 BOM = HERE / "bom.csv"
+LIGHT = HERE / "generated" / "LIGHT.md"
 PETG_USD_PER_G = 0.025
 KITS = ("logger", "radio", "flight")
 # Parts of each printed board and how many boards a logger has; the shield's references are bare.
@@ -88,14 +90,24 @@ def pieces(ref: str) -> int:
     return SYMBOLS[ref.rpartition(" ")[0]][1]
 
 
-def wire_m(harness_text: str) -> float:
-    """Return the metres of wire: every pin of a cable, supply and ground with it."""
+def wire_m(harness_text: str, without: Collection[str] = ()) -> float:
+    """Return the metres of wire: every pin of a cable, supply and ground with it.
+
+    Parameters
+    ----------
+    harness_text
+        Content of harness.toml.
+    without
+        Devices that are left out.
+    """
     total = 0.0
     harness = tomllib.loads(harness_text)
     for link in harness["link"]:
         if "length_mm" in link and link["from"] != "Shield J22":  # that is J22's own cable
             total += len(link["pins"]) * link["length_mm"] / 1000.0
     for device in harness["device"]:
+        if device["name"] in without:
+            continue
         lead = "servo leads" in device["connector"]  # bought ready
         supplies = 2 if device["supply"] != "none" else 1
         total += 0.0 if lead else (len(device["pins"]) + supplies) * device["length_mm"] / 1000.0
@@ -193,6 +205,101 @@ def made(masses_csv: str) -> list[Line]:
     return found
 
 
+def lightened(found: list[Line], leave: Mapping[str, Any], wire: float) -> list[Line]:
+    """Return the list once more parts have left.
+
+    Parameters
+    ----------
+    found
+        The list before.
+    leave
+        One entry of light.toml.
+    wire
+        Metres of wire that stay.
+
+    Raises
+    ------
+    BomError
+        A part that no line has.
+    """
+    parts = {row["key"]: row for row in _toml("parts.toml")["part"]}
+    named: dict[str, float] = {"the wire": wire}
+    for key, quantity in leave.get("parts", {}).items():
+        if key not in parts:
+            raise BomError(f"light.toml: parts.toml has no {key}")
+        named[parts[key]["what"]] = quantity
+    made_names = {line.what.rpartition(", ")[0]: line.what for line in found if line.maker == "own"}
+    for name, quantity in leave.get("made", {}).items():
+        if name in made_names:  # a magnet and what is bought stand among the parts
+            named[made_names[name]] = quantity
+        elif name != "magnet":
+            raise BomError(f"light.toml: masses.csv has no {name}")
+    named[parts["wire"]["what"]] = named.pop("the wire")
+    boards = leave.get("boards", {})
+    return [
+        replace(line, quantity=named.get(line.what, line.quantity * _stays(line, boards)))
+        for line in found
+    ]
+
+
+def _stays(line: Line, boards: Mapping[str, int]) -> float:
+    """Return the share of a line that stays when boards of a sensor leave."""
+    if not line.refs:
+        return 1.0
+    before = sum(map(pieces, line.refs))
+    after = sum(boards.get(ref.rpartition(" ")[0], pieces(ref)) for ref in line.refs)
+    return after / before
+
+
+def flown_g(found: list[Line], light: Mapping[str, Any]) -> tuple[float, float]:
+    """Return what flies, in g: with printed parts solid, and as they are printed."""
+    solid = printed = 0.0
+    for line in found:
+        name, _, material = line.what.rpartition(", ")
+        if line.maker == "own" and name in light["on_the_ground"]:
+            continue
+        solid += line.quantity * line.weight_g
+        share = light["printed_share"] if line.maker == "own" and material == "petg" else 1.0
+        printed += line.quantity * line.weight_g * share
+    return solid, printed
+
+
+def light_page(found: list[Line], light: Mapping[str, Any], harness_text: str) -> str:
+    """Return the page of the light variant."""
+    rows = [
+        "<!-- made by hw/generate_bom.py from light.toml and the parts list -->",
+        "# The light variant, for aircraft below 2.5 kg",
+        "",
+        "**Never built.** Listen only, as for every first flight"
+        " ([relay.md](../relay.md#first-flight-listen-only)).",
+        "Weights: parts list, printed parts at half of solid, what stays on the ground left out.",
+        "",
+        "| leaves | g | instead | what is lost |",
+        "| --- | --- | --- | --- |",
+    ]
+    without: set[str] = set()
+    before, stays = flown_g(found, light)[1], found
+    total = before
+    for leave in light["leave"]:
+        without |= set(leave.get("cables", ()))
+        stays = lightened(stays, leave, wire_m(harness_text, without))
+        after = flown_g(stays, light)[1]
+        rows.append(
+            f"| {leave['what']} | {before - after:.0f} | {leave['instead']} | {leave['lost']} |"
+        )
+        before = after
+    rows += [
+        "",
+        f"**{total:.0f} g become {before:.0f} g.** Each tip carries one vane on one boom instead of"
+        " two: half of the roll inertia that",
+        "they add; a boom at half span has a quarter, at a larger upwash",
+        "([install.md](../install.md#where-a-vane-may-stand)).",
+        "Swing the aircraft with everything in it all the same.",
+        "",
+    ]
+    return "\n".join(rows)
+
+
 def totals(found: list[Line]) -> dict[str, tuple[float, float]]:
     """Return price in USD and weight in g of each kit with all kits before it."""
     sums: dict[str, tuple[float, float]] = {}
@@ -222,6 +329,10 @@ def read() -> list[Line]:
     return lines(parts, symbols, harness) + made(masses)
 
 
+def _toml(name: str) -> dict[str, Any]:
+    return tomllib.loads((HERE / name).read_text(encoding="utf-8"))
+
+
 def text(found: list[Line]) -> str:
     """Return bom.csv."""
     out = io.StringIO()
@@ -238,15 +349,20 @@ def main(arguments: list[str] | None = None) -> int:
     check = parser.parse_args(arguments).check
     try:
         found = read()
+        harness = (HERE / "harness.toml").read_text(encoding="utf-8")
+        made_files = {BOM: text(found), LIGHT: light_page(found, _toml("light.toml"), harness)}
     except BomError as error:
         print(f"hw: {error}", file=sys.stderr)
         return 2
-    if check:
-        if not BOM.exists() or BOM.read_text(encoding="utf-8") != text(found):
-            print("hw/bom.csv is not current: run python hw/generate_bom.py", file=sys.stderr)
+    for path, content in made_files.items():
+        if not check:
+            path.write_text(content, encoding="utf-8", newline="\n")
+        elif not path.exists() or path.read_text(encoding="utf-8") != content:
+            name = path.relative_to(HERE)
+            print(f"hw/{name} is not current: run python hw/generate_bom.py", file=sys.stderr)
             return 6
+    if check:
         return 0
-    BOM.write_text(text(found), encoding="utf-8", newline="\n")
     for kit, (price, weight) in totals(found).items():
         print(f"{kit}: {price:.2f} USD, {weight:.0f} g")
     return 0

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import itertools
+import math
 import shutil
 import subprocess
 import sys
@@ -29,6 +30,9 @@ from sources import SHIELD
 HERE = Path(__file__).resolve().parent
 OUT = HERE / "generated"
 GRAVITY_MPS2 = 9.81
+# 0.5 % of pressure: a sixth of what tube and static port may be off (pitot_scale in
+# instrument/standard.toml).
+PITOT_SPEED_CHANGE = 0.0025
 
 
 def overlap_mm3(one: solids.Body, other: solids.Body) -> float:
@@ -73,7 +77,7 @@ def faults(sizes: solids.Sizes, vane: list[solids.Body], every: list[solids.Body
     gap = sizes["magnet"]["air_gap"]
     if not 0.5 <= gap <= 3.0:
         found.append(f"air gap {gap} mm, AS5600 wants 0.5 to 3")
-    found += jig_faults(sizes, vane, every)
+    found += jig_faults(sizes, vane, every) + pitot_faults(sizes)
     least = sizes["print"]["wall_least"]
     found += [f"{n}: wall {w:.2f} mm, least {least}" for n, w in walls(sizes).items() if w < least]
     for body in every:
@@ -108,6 +112,21 @@ def jig_faults(sizes: solids.Sizes, vane: list[solids.Body], every: list[solids.
         if shared and shared.volume > 1e-3:
             found.append(f"protractor fork does not enter its slot at {turn:g} deg")
     return found
+
+
+def pitot_faults(sizes: solids.Sizes) -> list[str]:
+    """Name a pitot that stands near enough to a vane to feel its housing.
+
+    The housing moves the air beside it as a sphere of its frontal area does: `(a / r)**3 / 2` of
+    the airspeed (Batchelor, An Introduction to Fluid Dynamics, 6.8).
+    """
+    beside = sizes["pitot"]["beside_vane"]
+    change = (sizes["housing"]["side"] / math.sqrt(math.pi) / beside) ** 3 / 2
+    if change <= PITOT_SPEED_CHANGE:
+        return []
+    return [
+        f"pitot {beside:g} mm beside a vane: its housing changes the speed there by {change:.1%}"
+    ]
 
 
 def walls(sizes: solids.Sizes) -> dict[str, float]:

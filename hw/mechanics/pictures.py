@@ -54,20 +54,25 @@ def vane_parts(sizes: solids.Sizes, text: str) -> Painted:
 
 
 def boom(sizes: solids.Sizes, text: str) -> Painted:
-    """Return a vane on its boom, with clamps and the pitot's holder."""
-    axis = solids.boom_z(sizes)
+    """Return a vane on its boom and a pitot on its own beside it, with clamps."""
+    axis, pitot = solids.boom_z(sizes), sizes["pitot"]
     parts = {body.name: body for body in solids.mounts(sizes)}
     start = sizes["housing"]["side"] / 2 + 4.0
     middle = start + sizes["boom"]["length"] / 2
-    found = _vane(solids.vane(sizes))
-    found.append((Pos(middle, 0, axis) * Rot(0, 90, 0) * parts["boom"].shape, _COLOURS["carbon"]))
     outer = sizes["boom"]["outer"] / 2 + 0.1 + sizes["clamp"]["wall"]
-    for x in (start + 190.0, start + 270.0):
-        found.append((Pos(x, 0, axis - outer) * parts["boom clamp"].shape, _COLOURS["petg"]))
-    at = Pos(start + 110.0, 0, axis) * Rot(-90, 0, 0) * Rot(0, 90, 0)
-    found.append((at * parts["pitot holder"].shape, _COLOURS["petg"]))
-    tube = Cylinder(sizes["pitot"]["tube"] / 2, 160.0)
-    found.append((at * Pos(sizes["pitot"]["offset"], 0, 0) * tube, _COLOURS["brass"]))
+    found = _vane(solids.vane(sizes))
+    for y in (0.0, -pitot["beside_vane"]):
+        tube = Pos(middle, y, axis) * Rot(0, 90, 0) * parts["boom"].shape
+        found.append((tube, _COLOURS["carbon"]))
+        for x in (start + 190.0, start + 270.0):
+            found.append((Pos(x, y, axis - outer) * parts["boom clamp"].shape, _COLOURS["petg"]))
+    flush = Pos(start + pitot["length"] / 2, -pitot["beside_vane"], axis)
+    turned = Rot(-90, 0, 0) * Rot(0, 90, 0)
+    found.append((flush * turned * parts["pitot holder"].shape, _COLOURS["petg"]))
+    behind = start + pitot["tube_long"] / 2 - pitot["ahead"]
+    probe = Pos(pitot["offset"], 0, 0) * Cylinder(pitot["tube"] / 2, pitot["tube_long"])
+    at = Pos(behind, -pitot["beside_vane"], axis) * turned
+    found.append((at * probe, _COLOURS["brass"]))
     return found
 
 

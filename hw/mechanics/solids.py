@@ -31,7 +31,7 @@ class Body:
     material
         A name of vane.toml's densities, or "bought" with its own mass.
     quantity
-        For one logger: four vanes, a boom each.
+        For one logger: four vanes and a pitot, a boom each.
     turns
         Turns with the vane.
     """
@@ -245,9 +245,9 @@ def mounts(sizes: Sizes) -> list[Body]:
     holder -= Cylinder(ring, pitot["length"])
     holder -= Pos(pitot["offset"], 0, 0) * Cylinder(bore, pitot["length"])
     return [
-        Body("boom", tube, "carbon", 4, group="mount"),
-        Body("boom clamp", saddle, "petg", 8, group="mount"),
-        Body("pitot holder", holder, "petg", 2, group="mount"),
+        Body("boom", tube, "carbon", 5, group="mount"),
+        Body("boom clamp", saddle, "petg", 10, group="mount"),
+        Body("pitot holder", holder, "petg", 1, group="mount"),
         Body("pot arm", _lever(pot, shaped=True), "petg", 4, group="mount"),
         Body("surface horn", _lever(pot, shaped=False), "petg", 4, group="mount"),
     ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+import tomllib
 from pathlib import Path
 from types import ModuleType
 
@@ -17,6 +18,7 @@ GENERATOR: ModuleType = load_module("generate_bom")
 PARTS, HARNESS = (
     (HW / path).read_text(encoding="utf-8") for path in ("parts.toml", "harness.toml")
 )
+LIGHT = tomllib.loads((HW / "light.toml").read_text(encoding="utf-8"))
 SYMBOLS = {
     board: (HW / path).read_text(encoding="utf-8") for board, (path, _) in GENERATOR.SYMBOLS.items()
 }
@@ -24,6 +26,46 @@ SYMBOLS = {
 
 def test_committed_list_is_current() -> None:
     assert (HW / "bom.csv").read_text(encoding="utf-8") == GENERATOR.text(GENERATOR.read())
+
+
+def test_page_of_the_light_variant_is_current() -> None:
+    found = GENERATOR.light_page(GENERATOR.read(), LIGHT, HARNESS)
+    assert (HW / "generated" / "LIGHT.md").read_text(encoding="utf-8") == found
+
+
+def test_what_leaves_weighs_what_the_list_says() -> None:
+    # Two of four vane boards: half of the board's parts, two boards, two magnets, four bearings.
+    found = GENERATOR.read()
+    (vanes,) = (row for row in LIGHT["leave"] if "boards" in row)
+    wire_m = GENERATOR.wire_m(HARNESS)
+    bare = {key: row for key, row in vanes.items() if key != "made"}
+    less = GENERATOR.lightened(found, bare, wire_m)
+    left = GENERATOR.flown_g(found, LIGHT)[0] - GENERATOR.flown_g(less, LIGHT)[0]
+    own = sum(
+        line.weight_g * len(line.refs) * 2
+        for line in found
+        if line.refs and all(ref.startswith("vane ") for ref in line.refs)
+    )
+    shared = sum(
+        line.weight_g * sum(ref.startswith("vane ") for ref in line.refs) * 2
+        for line in found
+        if not all(ref.startswith("vane ") for ref in line.refs)
+    )
+    assert left == pytest.approx(own + shared + 2 * 1.6 + 2 * 0.53 + 4 * 0.35)
+
+
+def test_wire_of_a_device_left_out_is_not_counted() -> None:
+    # Two supplies and one signal of 1.4 m.
+    less = GENERATOR.wire_m(HARNESS) - GENERATOR.wire_m(HARNESS, ["Vane alpha right"])
+    assert less == pytest.approx(3 * 1.4, abs=1.0)
+
+
+def test_what_cannot_leave_is_refused() -> None:
+    found = GENERATOR.read()
+    with pytest.raises(GENERATOR.BomError, match="has no sail"):
+        GENERATOR.lightened(found, {"parts": {"sail": 0}}, 1.0)
+    with pytest.raises(GENERATOR.BomError, match="has no keel"):
+        GENERATOR.lightened(found, {"made": {"keel": 0}}, 1.0)
 
 
 def test_readme_states_every_total() -> None:

@@ -30,6 +30,7 @@ def test_bodies_fit_and_committed_masses_are_current() -> None:
         ("counterweight", "step", 5.0, "balance"),
         ("magnet", "air_gap", 4.0, "air gap 4.0 mm"),
         ("housing", "collar", 8.0, "bearing seat: wall"),
+        ("pitot", "beside_vane", 16.0, "pitot 16 mm beside a vane"),
     ],
 )
 def test_a_planted_fault_is_found(group: str, name: str, value: float, complaint: str) -> None:
