@@ -420,12 +420,6 @@ SWITCHES = (
         gives([]),
     ),
     _one(
-        "airspeed's scale",
-        "tests the airspeed's scale against its file",
-        "checks.airspeed_scale:airspeed_scale_findings",
-        gives([]),
-    ),
-    _one(
         "calibration",
         "tests sensor errors against their file",
         "checks.agreement_findings:calibration_findings",

@@ -80,7 +80,7 @@ OF_COLUMNS: dict[str, tuple[str, Change]] = {
 }
 LATER = {
     "small-inputs", "feedback", "flow-angles", "calibration", "surface-rate",
-    "instrument-errors", "airspeed-scale", "time-digits",
+    "instrument-errors", "time-digits",
 }  # fmt: skip
 
 

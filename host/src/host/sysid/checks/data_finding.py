@@ -48,7 +48,6 @@ CHECKS = {
     "instrument-errors": "errors of sensors and servos are in the intervals",
     "flow-angles": "vanes measured angle of attack and sideslip",
     "small-inputs": "a surface moves enough for a maneuver to be found",
-    "airspeed-scale": "airspeed is, within its file, what forces and wind angles say",
     "calibration": "sensor errors are as small as their file says",
     "feedback": "a surface moves by itself, and is no function of what the aircraft does",
 }

@@ -48,25 +48,6 @@ class DrivenFactor:
 
 
 @dataclass(frozen=True, slots=True)
-class SensorTolerances:
-    """One deviation of right sensors.
-
-    Attributes
-    ----------
-    shares : mapping
-        Of the scale of each part, and of the rate ("").
-    delays : float
-        Of delays, times those of the identity.
-    unknown : float
-        Of the motion, that they make of it in other ways.
-    """
-
-    shares: Mapping[str, float]
-    delays: float
-    unknown: float
-
-
-@dataclass(frozen=True, slots=True)
 class _Seen:
     """A signal and its past: along what surfaces explain at most, and all else of it.
 
@@ -110,21 +91,9 @@ class DrivenTest:
 
         It has no scale beside it then.
         """
-        shares = {name: SENSOR_SHARE for name in self.parts if name != scaled}
-        shares |= {} if scaled else {"": SENSOR_SHARE}
-        within = SensorTolerances(shares, 1.0, UNKNOWN_SHARE)
-        return _squared(*self._explained(scaled, factors, within))
+        return _squared(*self._explained(scaled, factors))
 
-    def deviances(
-        self, scaled: str, factors: Sequence[float] | Array, within: SensorTolerances
-    ) -> Array:
-        """Return minus twice the logarithm of the likelihood of factors, but for a constant."""
-        off, covariance = self._explained(scaled, factors, within)
-        return np.asarray(_squared(off, covariance) + np.linalg.slogdet(covariance)[1])
-
-    def _explained(
-        self, scaled: str, factors: Sequence[float] | Array, within: SensorTolerances
-    ) -> tuple[Array, Array]:
+    def _explained(self, scaled: str, factors: Sequence[float] | Array) -> tuple[Array, Array]:
         """Return what surfaces explain of the identity, (factors, instruments), and its covariance.
 
         One stacked factorisation for all factors: a table with a wrong unit asks for 100 000.
@@ -138,10 +107,11 @@ class DrivenTest:
         weights, squares = _whitening(left.rest + more * added.rest)
         free = len(self._own) - PAST_STEPS - self._own.shape[1] - self.instruments
         variance = squares / free
-        variance += within.unknown**2 * np.mean((weights @ self.rate.along.T) ** 2, axis=1)
-        signals = self.parts | {"": self.rate}
-        errors = [share * signals[name].along for name, share in within.shares.items()]
-        errors += [*self._errors, *(within.delays * one for one in self._delayed)]
+        variance += UNKNOWN_SHARE**2 * np.mean((weights @ self.rate.along.T) ** 2, axis=1)
+        unscaled = [part for name, part in self.parts.items() if name != scaled]
+        unscaled += [] if scaled else [self.rate]
+        errors = [SENSOR_SHARE * one.along for one in unscaled]
+        errors += [*self._errors, *self._delayed]
         error = weights @ np.stack(errors).transpose(0, 2, 1)  # (errors, factors, instruments)
         covariance = np.einsum("efi,efj->fij", error, error)
         covariance += variance[:, None, None] * np.eye(self.instruments)

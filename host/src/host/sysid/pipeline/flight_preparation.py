@@ -16,7 +16,6 @@ from host.instrument.servo_prior import servo_prior
 from host.physical.calibration import Calibration, load_calibration
 from host.sysid.aerodynamics.measured_thrust import with_thrust
 from host.sysid.checks.agreement_findings import calibration_findings
-from host.sysid.checks.airspeed_scale import airspeed_scale_findings
 from host.sysid.checks.data_finding import Finding
 from host.sysid.checks.feedback_findings import feedback_findings
 from host.sysid.checks.finding_consequences import blamed
@@ -119,7 +118,6 @@ def prepare(given: FlightAtHand) -> PreparedFlight:
         *fed_back,
         *agreed.findings,
         *no_vanes_finding(columns, reconstructed=reconstructed),
-        *_airspeed_findings(flight.corrected, instrument, agreed.found),
     ]
     findings, unused = blamed(findings, how.equations)
     flight = replace(
@@ -143,17 +141,6 @@ def prepare(given: FlightAtHand) -> PreparedFlight:
     given_twice = overlap_notes(how.stretches)
     said = (*read.notes, *travel, *open_notes, *given_twice, *agreed.notes, *line, *unused)
     return PreparedFlight(flight, agreed.found, said, agreed.unchecked)
-
-
-def _airspeed_findings(
-    corrected: Mapping[str, Array],
-    instrument: SensorErrorModel | None,
-    agreement: Compatibility | None,
-) -> list[Finding]:
-    """Return whether forces contradict the airspeed, where no GPS has told its scale already."""
-    if instrument is None or (agreement is not None and agreement.gps):
-        return []
-    return airspeed_scale_findings(corrected, instrument)
 
 
 def _sensors(given: FlightAtHand, instrument: SensorErrorModel | None) -> SensorErrorModel:
