@@ -77,10 +77,17 @@ ESTIMATES = """(async () => {
     return document.getElementById("estimates-next").innerText.split(":")[0];
   });
   const { compass } = await import("./plan.js");
-  const { PLOTS } = await import("./channels.js");
+  const { PLOTS, words } = await import("./channels.js");
   const unit = ([column]) => column.split("_").pop();
   const units = PLOTS.map(({ series }) => new Set(series.map(unit)).size);
-  return { ...shown, called, heading: [-90, 359.7, 725].map(compass), units: Math.max(...units) };
+  const airspeed = [-2, 4.9, 17.04, -8, null].map((one) => words(one, 1, 5));
+  const { showDoubts } = await import("./panel.js");
+  const none = document.getElementById("doubts").innerText;
+  showDoubts([{ figure: "height", text: "<b>barometer" }]);
+  const doubts = [none, document.getElementById("doubts").innerText,
+    document.querySelectorAll(".figure.bad > #height").length];
+  return { ...shown, called, airspeed, doubts,
+    heading: [-90, 359.7, 725].map(compass), units: Math.max(...units) };
 })()"""
 
 
@@ -162,6 +169,8 @@ def look(live: ServedPage, folder: Path) -> None:
         assert told["called"] == ["after the card", "next"]
         assert told["heading"] == [270, 0, 5]
         assert told["units"] == 1  # of a strip
+        assert told["airspeed"] == ["< 5", "< 5", "17.0", "-8.0", "-"]
+        assert told["doubts"] == ["", "<b>barometer", 1]
         assert told["head"] == "2 of 3 enough"
         assert [("enough" in line, line.split()[0]) for line in told["lines"]] == [
             (True, "Cm"), (True, "Cn"), (False, "Cl"),

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 from host.constants import RAD_PER_DEG
+from host.live.doubtful_values import DoubtfulValues
 from host.live.link_budget import LinkBudget
 from host.live.live_sample import LiveUpdate, SlowFrame
 from host.live.live_stream import LiveStream
@@ -38,6 +39,7 @@ class FlightState:
         self.link = LinkBudget()
         self.track = LiveTrack()
         self.servos = ServoWatch()
+        self.doubts = DoubtfulValues()
         self.preflight: Callable[[], dict[str, Any]] | None = None  # what one says, where there is
         self.events: deque[dict[str, Any]] = deque(maxlen=_EVENTS)
         self._stream = stream
@@ -64,6 +66,7 @@ class FlightState:
         """Return everything but the rows themselves."""
         link = self.link.at(time.monotonic())
         preflight = None if self.preflight is None else self.preflight()
+        points = self.track.points
         return {
             "t_s": self._row.get("t_s", 0.0),
             "age_s": None if math.isinf(link.age_s) else round(link.age_s, 3),
@@ -84,6 +87,7 @@ class FlightState:
             "switch_us": self._switch_us(),
             "gps": self._gps(),
             "who": self._who(),
+            "doubts": self.doubts.named(points[-1][2] if points else math.nan),
             "jumps": dict(self.servos.jumps),
             "wind_mps": self.track.wind_mps,
             "track_made": self.track.made,
@@ -98,6 +102,7 @@ class FlightState:
         for surface in self.servos.add(update):
             self.say("servo", f"{surface} servo jumped, its stick did not move")
         if len(update):
+            self.doubts.take(update.rows)
             self._row = {name: float(column[-1]) for name, column in update.rows.items()}
         for frame in update.slow:
             self._last[frame.name] = frame

@@ -18,17 +18,20 @@ class JsonLines(Audience):
     def __init__(self, show: Callable[[str], None]) -> None:
         self._show = show
         self._last = self._verdict = 0
+        self._ended = False
 
     def rows(self, message: bytes) -> None:
         """Not shown."""
 
     def state(self, message: str) -> None:
-        """Show new verdicts, and every fifth state: five come in a second."""
+        """Show new verdicts, and every fifth state, for five come in a second; and the last."""
         self._last += 1
         said = json.loads(message)
         for verdict in said.get("test_point", {}).get("verdicts", []):
             if verdict["number"] > self._verdict:
                 self._verdict = verdict["number"]
                 self._show(json.dumps({"type": "verdict"} | verdict))
-        if self._last % 5 == 1:
+        ended = said.get("ended", False)
+        last, self._ended = ended and not self._ended, ended
+        if self._last % 5 == 1 or last:
             self._show(json.dumps(said))

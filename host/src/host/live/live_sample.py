@@ -30,7 +30,8 @@ LIVE_UNITS = {
         (f"servo_{name}_us" for name in ("elevator", "aileron", "rudder", "throttle")), "us"
     ),
     "rc_switch_us": "us",
-    "altitude_m": "m",
+    "altitude_m": "m",  # above the level of 101325 Pa
+    "height_m": "m",  # over the start
 }
 
 

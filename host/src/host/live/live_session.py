@@ -154,7 +154,9 @@ class LiveSession:
                 self._safely(self._said, portion.text)
             self._safely(self._answer)
             self._safely(self._show_state)
-            if last and portion is None:
+            if last and portion is None and not self.ended.is_set():
+                self._shown_s = 0.0  # the last state is always shown
+                self._safely(self._show_state, True)
                 self.ended.set()
 
     def _safely(self, show: Callable[..., None], *given: Any) -> None:
@@ -202,14 +204,14 @@ class LiveSession:
         row = self.state.say("mark", f"mark {self._marks}")
         self.note("mark", number=self._marks, t_s=row["t_s"], who=what["who"])
 
-    def _show_state(self) -> None:
+    def _show_state(self, ended: bool = False) -> None:
         now_s = time.monotonic()
         if now_s - self._shown_s < _STATE_S or not self.audiences:
             return
         self._shown_s = now_s
         what = self.state.as_json() | {
             "type": "state",
-            "ended": self.ended.is_set(),
+            "ended": ended or self.ended.is_set(),
             "source": self.source.name,
             "captured_bytes": self.capture.size_bytes if self.capture else None,
             "capture": self.capture.path.name if self.capture else None,

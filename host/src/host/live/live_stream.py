@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from host.link.serial import LineSplitter
 from host.link.status_line import StatusLine, parse_status
+from host.live.height_over_start import HeightOverStart
 from host.live.live_sample import LIVE_UNITS, Array, LiveUpdate, SlowFrame
 from host.live.text_rows import TextRows
 from host.people_units import people_columns
@@ -77,6 +78,7 @@ class LiveStream:
         self._t_s = 0.0
         self._last_row_s: float | None = None
         self._static_pa = np.nan
+        self._height = HeightOverStart()
         self._maker: ChannelMaker | None = None
 
     @property
@@ -243,5 +245,6 @@ class LiveStream:
         out["airspeed_a_mps"] = calibrated_airspeed_mps(made["differential_a_pa"])
         out["airspeed_b_mps"] = calibrated_airspeed_mps(made["differential_b_pa"])
         out["altitude_m"] = pressure_altitude_m(np.array(static_pa))
+        out["height_m"] = self._height.of(np.asarray(out["altitude_m"], np.float64))
         drives = (data["valid"] & self.schema.bit("valid", "mega_drives")) != 0
         return {name: np.asarray(out[name], np.float64) for name in LIVE_UNITS}, np.asarray(drives)

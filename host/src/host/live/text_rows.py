@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from host.errors import HostError
+from host.live.height_over_start import HeightOverStart
 from host.live.live_sample import LIVE_UNITS, LiveUpdate
 from host.original.row_table import make_table
 from host.original.rows import looks_like_rows, parse_rows
@@ -30,6 +31,7 @@ class TextRows:
         self._calibration = calibration
         self._held = bytearray()
         self._first_s: float | None = None
+        self._height = HeightOverStart()
 
     def feed(self, data: bytes, arrived_s: float) -> LiveUpdate | None:
         """Take more of the stream; return the rows that it completes, None without any."""
@@ -52,5 +54,6 @@ class TextRows:
         read = people_columns(table)
         rows = {name: np.asarray(read.get(name, nothing), float) for name in LIVE_UNITS}
         rows["airspeed_a_mps"] = np.asarray(table["airspeed_mps"], float)
+        rows["height_m"] = self._height.of(rows["altitude_m"])
         rows["t_s"] = np.full(count, arrived_s - self._first_s)
         return LiveUpdate(rows, np.ones(count, bool), 0, [], arrived_s)

@@ -22,6 +22,16 @@ function pulses(name) {
   };
 }
 
+// Below it a pitot tells nothing: its first count stands for 2.8 m/s.
+export const LEAST_AIRSPEED_MPS = 5;
+
+export function words(value, digits, least = 0) {
+  if (value === null) return "-";
+  if (Math.abs(value) < least) return `< ${least}`;
+  const text = value.toFixed(digits);
+  return Number(text) === 0 ? text.replace("-", "") : text;
+}
+
 export const PLOTS = [
   pulses("elevator"),
   {
@@ -66,6 +76,7 @@ export const PLOTS = [
     unit: "m/s",
     span: 5,
     digits: 1,
+    least: LEAST_AIRSPEED_MPS,
     difference: ["airspeed_a_mps", "airspeed_b_mps"],
     series: [["airspeed_a_mps", "L", LEFT], ["airspeed_b_mps", "R", RIGHT]],
   },
@@ -79,13 +90,13 @@ export const PLOTS = [
   },
   { ...pulses("throttle"), times: true },
   {
-    id: "altitude",
+    id: "height",
     times: true,
     title: "height",
     unit: "m",
     span: 20,
     digits: 0,
-    series: [["altitude_m", "pressure", LEFT]],
+    series: [["height_m", "over start", LEFT]],
   },
   {
     id: "surfaces",

@@ -1,5 +1,6 @@
 // Puts the page together: rows into the history, thirty redraws a second, the state five times.
 
+import { LEAST_AIRSPEED_MPS, words } from "./channels.js";
 import { connect } from "./connection.js";
 import { showEstimates } from "./estimates.js";
 import { History } from "./history.js";
@@ -97,9 +98,9 @@ function tell() {
   showAge(age, banner(age));
   plots.say(history, state ? state.jumps : {});
   const pair = ["airspeed_a_mps", "airspeed_b_mps"].map((one) => history.last(one)).filter((one) => one !== null);
-  byId("airspeed").textContent = pair.length ? (pair.reduce((a, b) => a + b) / pair.length).toFixed(1) : "-";
-  const points = plan.points;
-  byId("height").textContent = points.length ? points[points.length - 1][2].toFixed(0) : "-";
+  const airspeed = pair.length ? pair.reduce((a, b) => a + b) / pair.length : null;
+  byId("airspeed").textContent = words(airspeed, 1, LEAST_AIRSPEED_MPS);
+  byId("height").textContent = words(history.last("height_m") ?? plan.height(), 0);
   const heading = history.last("psi_deg");
   byId("plan-text").textContent = plan.text(heading);
   plan.draw(heading);

@@ -33,6 +33,7 @@ export function showState(state) {
   byId("gps-fix").textContent = gps.fix ?? "satellites";
   byId("rail").textContent = figure(system.rail_v, 2);
   byId("supply").textContent = figure(system.supply_v, 2);
+  showDoubts(state.doubts);
   showFacts(state, link, system);
   showEvents(state.events);
 }
@@ -54,6 +55,14 @@ function showFacts(state, link, system) {
   fact(list, "viewers", String(state.viewers));
   fact(list, "from", state.source.split(/[\\/]/).pop());
   byId("facts").replaceChildren(list);
+}
+
+export function showDoubts(doubts) {
+  const said = doubts.map((doubt) => doubt.text).join("; ");
+  if (byId("doubts").textContent !== said) byId("doubts").textContent = said;
+  for (const figure of ["airspeed", "height"]) {
+    byId(figure).parentElement.classList.toggle("bad", doubts.some((doubt) => doubt.figure === figure));
+  }
 }
 
 let lastEvent = 0;

@@ -134,6 +134,11 @@ export class Plan {
     pen.fillText(`wind ${speed.toFixed(0)} m/s`, width - 6, 74);
   }
 
+  // Metres over home by GPS.
+  height() {
+    return this.points.length ? this.points[this.points.length - 1][2] : null;
+  }
+
   text(heading) {
     if (!this.points.length) return "no position";
     const [x, y] = this.points[this.points.length - 1];

@@ -4,7 +4,7 @@
 // steps everything but the newest rows stands where it stood, and only these are added. The plots
 // take their steps in turn, so that a redraw has four of them to draw anew and not all twelve.
 
-import { PLOTS } from "./channels.js";
+import { PLOTS, words } from "./channels.js";
 
 const AXIS = "#333";
 const GRID = { stroke: "#ddd", width: 1 };
@@ -173,10 +173,9 @@ class Plot {
   }
 
   say(history, jumps) {
-    const { digits, series, difference } = this.what;
+    const { digits, least, series, difference } = this.what;
     series.forEach(([column], at) => {
-      const value = history.last(column);
-      set(this.values[at], value === null ? "-" : value.toFixed(digits));
+      set(this.values[at], words(history.last(column), digits, least));
     });
     if (difference) {
       const [left, right] = difference.map((column) => history.last(column));
