@@ -22,7 +22,7 @@ COPIED = (".md", ".svg", ".png", ".jpg", ".toml", ".csv", ".h", ".json", ".html"
 USERS = (
     "README.md", "START.md", "host/README.md", "host/IDENTIFY.md", "host/LOGS.md", "host/LIVE.md",
     "host/PREFLIGHT.md", "host/CARD.md", "host/CALIBRATE.md", "host/PLOT.md", "host/TUNE.md",
-    "host/FLEET.md", "host/FIELD.md", "host/HELP.md",
+    "host/FLEET.md", "host/FIELD.md", "host/HELP.md", "host/generated/OPTIONS.md",
 )  # fmt: skip
 
 

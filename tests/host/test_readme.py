@@ -1,4 +1,4 @@
-"""What host/README.md promises: its example runs, its codes and options are those of the code."""
+"""What host/README.md promises: its example runs, its codes are those of the code."""
 
 import re
 from pathlib import Path
@@ -29,14 +29,6 @@ def test_example_runs(
 def test_exit_codes() -> None:
     table = TEXT.partition("## Exit codes")[2].partition("##")[0]
     assert {int(code) for code in re.findall(r"^\| (\d+) \|", table, re.M)} == set(ExitCode)
-
-
-def test_every_option_of_decode_is_documented(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as caught:
-        main(["decode", "--help"])
-    assert caught.value.code == 0
-    helped = set(re.findall(r"--[a-z-]+", capsys.readouterr().out)) - {"--help", "--output"}
-    assert helped <= set(re.findall(r"--[a-z-]+", TEXT))
 
 
 def test_the_notebook_runs(

@@ -23,5 +23,6 @@ def test_flash_codes_are_those_of_the_firmware() -> None:
     panel = (ROOT / "firmware/app/panel.cpp").read_text()
     body = panel.partition("trouble_flashes")[2].partition("\n}")[0]
     made = {int(one) for one in re.findall(r"return (\d+);", body)} - {0}
-    table = (ROOT / "hw/bring-up.md").read_text().partition("## Step by step")[0]
+    made |= {int(one) for one in re.findall(r"kRelayFlashes = (\d+);", panel)}
+    table = (ROOT / "host/HELP.md").read_text().partition("## What you see on the computer")[0]
     assert {int(one) for one in re.findall(r"^\| (\d)(?: flashes|) ?", table, re.M)} - {0} == made
