@@ -29,14 +29,15 @@ from host.arrays import Array
 from host.compiled import prefer_machine_code
 from host.control import AUTOPILOTS, Tuning, tune
 from host.control.actuator import PULSE_PERIOD_S
-from host.control.autopilots.structure import Structure, YawStructure
-from host.control.scenarios import draw as draw_scenarios
+from host.control.autopilots.structure import Structure
+from host.control.lateral_pair import PairProblem
 from host.sysid.pipeline import identify
 from host.twin.flight.draws import draw, true_airframe
 from host.twin.virtual import virtual_flight
 
-from studies.study_table import Table, markdown
+from studies.study_table import Cell, Table, markdown
 from studies.tuned_flights.closed_loop_flight import AXES, ClosedLoop, Demand, Flown, fly
+from studies.tuned_flights.linear_flight import fly_linear
 from studies.tuned_flights.measured_margins import computed, measured
 from studies.tuned_flights.px4_autotune import autotuned
 from studies.tuned_flights.step_figures import moving_at_the_end, step_figures
@@ -47,6 +48,7 @@ STEPS = {"bank 30 deg": Demand(bank_rad=np.radians(30.0)),
          "pitch 8 deg": Demand(pitch_rad=np.radians(8.0))}  # fmt: skip
 GUSTS_MPS = (0.0, 1.0, 2.0)
 SERVO_SHARE, BACK_SHARE = 0.5, 0.03  # servo at half speed, CG 3 % of the chord back
+OUTSIDE_DB, OUTSIDE_DEG = 1.5, 8.0  # of the margins computed: an outlier, which is named
 GYRO_NOISE_RADPS = 0.002
 PROCESSES = 2
 OTHER_PART = 4  # default gains and those of PX4's autotune fly on every fourth of the aircraft
@@ -67,6 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m studies.tuned_flights", description=__doc__)
     parser.add_argument("--autopilot", choices=tuple(AUTOPILOTS), default="ardupilot")
     parser.add_argument("--aircraft-drawn", type=int, default=200)
+    parser.add_argument("--processes", type=int, default=PROCESSES)
     parser.add_argument("--first", type=int, default=FIRST_SEED)
     asked = parser.parse_args(arguments)
     found = tuned(asked.autopilot, asked.first)
@@ -84,26 +87,38 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if asked.autopilot == "px4":
         sets["autotune's"] = {one.axis: autotuned(one.problem) for one in found.axes}
     drawn = from_covariance(found, asked.aircraft_drawn, asked.first)
-    print(f"{drawn[0]} of {drawn[1]} linear aircraft of the answer's covariance are unstable\n")
-    with ProcessPoolExecutor(PROCESSES, initializer=prefer_machine_code) as processes:
+    print(markdown(drawn), flush=True)
+    with ProcessPoolExecutor(asked.processes, initializer=prefer_machine_code) as processes:
         for name, gains in sets.items():
             part = 1 if name == "tuned" else OTHER_PART
             seeds = range(asked.first, asked.first + max(asked.aircraft_drawn // part, 1))
-            yaw = found.yaw.problem.yaw if found.yaw and "yaw" in gains else None
-            craft = Craft(laws, gains, found.autopilot.travel_rad, yaw)
+            pair = found.yaw.problem if found.yaw and "yaw" in gains else None
+            craft = Craft(laws, gains, found.autopilot.travel_rad, pair)
             flown = Flights(craft, seeds, processes)
             print(markdown(flown.table(f"{asked.autopilot}, {name} gains")), flush=True)
     return 0
 
 
-def from_covariance(found: Tuning, count: int, seed: int) -> tuple[int, int]:
-    """Return how many linear aircraft of a fresh drawing are unstable, of how many."""
-    bad = total = 0
-    for one in found.axes:
-        scenarios = draw_scenarios(one.problem, seed=seed + 7, count=count)
-        stable = scenarios.stable(one.design.gains or {})
-        bad, total = bad + int(np.sum(stable == 0)), total + len(stable)
-    return bad, total
+def from_covariance(found: Tuning, count: int, seed: int) -> Table:
+    """Return one row an axis and airspeed: linear aircraft of a fresh drawing, flown."""
+    rows = []
+    for one, (step, demand) in zip(found.axes, STEPS.items(), strict=True):
+        flights = fly_linear(
+            one.problem, one.design.gains or {}, demand, seed=seed + 7, count=count
+        )
+        rows += [_row(f"{step}, {speed:.1f} m/s", flown, demand) for speed, flown in flights]
+    return Table(f"{found.autopilot.name}, linear aircraft of the covariance", COLUMNS, tuple(rows))
+
+
+def _row(case: str, flown: Sequence[Flown], demand: Demand, calm: bool = True) -> tuple[Cell, ...]:
+    """Return how many of a case's flights were lost or still move, and the medians of the step."""
+    kept = [one for one in flown if not one.lost]
+    figures = np.array([step_figures(one, demand) for one in kept])
+    with warnings.catch_warnings():  # a step that none settles has no median
+        warnings.simplefilter("ignore", RuntimeWarning)
+        middle = np.nanmedian(figures, axis=0).tolist()
+    moving = sum(moving_at_the_end(one) for one in kept) if calm else math.nan
+    return (case, len(flown), len(flown) - len(kept), moving, *middle, math.nan, math.nan, "")
 
 
 @dataclass(frozen=True)
@@ -113,7 +128,7 @@ class Craft:
     laws: Mapping[str, Structure]
     gains: Gains
     full_rad: float | None = None
-    yaw: YawStructure | None = None
+    pair: PairProblem | None = None
 
     def loop(
         self, seed: int, speed_mps: float, servo: float = 1.0, back: float = 0.0
@@ -129,7 +144,7 @@ class Craft:
         )
         pulse_s = float(rng.uniform(0.0, PULSE_PERIOD_S))
         at = solve(frame, speed_mps)
-        return ClosedLoop(frame, at, self.laws, self.gains, pulse_s, self.full_rad, self.yaw)
+        return ClosedLoop(frame, at, self.laws, self.gains, pulse_s, self.full_rad, self.pair)
 
     def fly(
         self, seed: int, *, speed: float, demand: Demand, gusts: float, changes: tuple[float, ...]
@@ -140,13 +155,10 @@ class Craft:
         return fly(loop, demand, turbulence_mps=gusts, gyro_noise_radps=noise, seed=seed)
 
     def off(self, seed: int, *, axis: str) -> Array:
-        """Return measured minus computed gain (dB) and phase margin (deg) of one."""
+        """Return gain (dB) and phase margin (deg) of one, measured and computed, shape (2, 2)."""
         loop = self.loop(seed, SPEEDS_MPS[1])
-        flown, known = measured(loop, axis), computed(loop, axis)
-        return np.array([
-            float(flown.gain_db[0] - known.gain_db[0]),
-            float(flown.phase_deg[0] - known.phase_deg[0]),
-        ])  # fmt: skip
+        both = measured(loop, axis), computed(loop, axis)
+        return np.array([[one.gain_db[0], one.phase_deg[0]] for one in both])
 
 
 @dataclass(frozen=True)
@@ -158,10 +170,14 @@ class Flights:
     processes: Executor
 
     def table(self, title: str) -> Table:
-        """Return one row a case: flights lost or still moving, figures of the step."""
-        return Table(title, COLUMNS, tuple(tuple(row) for row in self._rows()))
+        """Return one row a case: flights lost or still moving, figures of the step; outliers."""
+        rows = tuple(self._rows())
+        margins = [self._margins(axis) for axis in (*AXES, *(["yaw"] if self.craft.pair else []))]
+        outside = [line for _, lines in margins for line in lines]
+        remark = "\n".join(outside) or "No margin is further from the computed one."
+        return Table(title, COLUMNS, (*rows, *(row for row, _ in margins)), remark)
 
-    def _rows(self) -> Iterator[list[str | int | float]]:
+    def _rows(self) -> Iterator[tuple[Cell, ...]]:
         for speed in SPEEDS_MPS:
             for step in STEPS:
                 for gusts in GUSTS_MPS:
@@ -173,28 +189,33 @@ class Flights:
             for step in STEPS:
                 case = f"{step}, {SPEEDS_MPS[1]:g} m/s, {name}"
                 yield self._row(case, step, SPEEDS_MPS[1], 0.0, changes)
-        for axis in AXES:
-            found = self.processes.map(partial(self.craft.off, axis=axis), self.seeds)
-            off = np.array(list(found))
-            within = np.nanquantile(np.abs(off), 0.95, axis=0)
-            lost = int(np.isnan(off).any(axis=1).sum())
-            yield [f"margins, {axis}, {SPEEDS_MPS[1]:g} m/s", len(off), lost, *[math.nan] * 5,
-                   *np.nanmean(off, axis=0).tolist(),
-                   f"{within[0]:.2f} dB, {within[1]:.1f} deg"]  # fmt: skip
+
+    def _margins(self, axis: str) -> tuple[tuple[Cell, ...], list[str]]:
+        """Return a row of measured minus computed margins, and a line of each outlier."""
+        found = self.processes.map(partial(self.craft.off, axis=axis), self.seeds)
+        both = np.array(list(found))
+        off = both[:, 0] - both[:, 1]
+        outside = np.any(np.abs(off) > (OUTSIDE_DB, OUTSIDE_DEG), axis=1)
+        within = np.quantile(np.abs(off), 0.95, axis=0)
+        lines = [
+            f"- outside, {axis}, aircraft {seed}: measured {db:.1f} dB {deg:.0f} deg,"
+            f" computed {known_db:.1f} dB {known_deg:.0f} deg"
+            for seed, ((db, deg), (known_db, known_deg)) in zip(
+                np.array(self.seeds)[outside], both[outside], strict=True
+            )
+        ]
+        lost = int(np.sum(~both[:, 0].any(axis=1)))
+        row = (f"margins, {axis}, {SPEEDS_MPS[1]:g} m/s", len(off), lost, *[math.nan] * 5,
+               *np.mean(off, axis=0).tolist(),
+               f"{within[0]:.2f} dB, {within[1]:.1f} deg; {outside.sum()} outside")  # fmt: skip
+        return row, lines
 
     def _row(
         self, case: str, step: str, speed: float, gusts: float, changes: tuple[float, ...] = ()
-    ) -> list[str | int | float]:
+    ) -> tuple[Cell, ...]:
         demand = STEPS[step]
         one = partial(self.craft.fly, speed=speed, demand=demand, gusts=gusts, changes=changes)
-        flown = list(self.processes.map(one, self.seeds))
-        kept = [one for one in flown if not one.lost]
-        figures = np.array([step_figures(one, demand) for one in kept])
-        with warnings.catch_warnings():  # a step that none settles has no median
-            warnings.simplefilter("ignore", RuntimeWarning)
-            middle = np.nanmedian(figures, axis=0).tolist()
-        moving = math.nan if gusts else sum(moving_at_the_end(one) for one in kept)
-        return [case, len(flown), len(flown) - len(kept), moving, *middle, math.nan, math.nan, ""]
+        return _row(case, list(self.processes.map(one, self.seeds)), demand, calm=not gusts)
 
 
 if __name__ == "__main__":

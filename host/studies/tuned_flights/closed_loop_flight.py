@@ -10,18 +10,30 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from host.aircraft.air import GUST_STATES, Air, gust_step, turbulence
-from host.aircraft.airframe import AILERON, ELEVATOR, Q0, Q3, Airframe, P, Q, R, U, W
+from host.aircraft.airframe import (
+    AILERON,
+    ELEVATOR,
+    Q0,
+    Q3,
+    RUDDER,
+    Airframe,
+    P,
+    Q,
+    R,
+    U,
+    W,
+)
 from host.aircraft.attitude import euler
 from host.aircraft.rigid_body import step
 from host.aircraft.trim import Trim
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.control.actuator import PULSE_PERIOD_S
-from host.control.autopilots.structure import Structure, YawStructure
+from host.control.autopilots.structure import Structure
+from host.control.lateral_pair import PairProblem
 from scipy.signal import butter
 
 AXES = ("roll", "pitch")
@@ -31,6 +43,7 @@ BANK_RAD, PITCH_RAD = math.radians(90.0), math.radians(60.0)  # beyond: the flig
 # Sense of a surface's moment: aileron rolls right, elevator down pitches down, rudder left.
 SENSE = {"roll": 1.0, "pitch": -1.0, "yaw": -1.0}
 COMMANDS = {"roll": 1, "pitch": 0, "yaw": 2}
+SURFACES = {"roll": AILERON, "pitch": ELEVATOR, "yaw": RUDDER}  # in the state
 
 
 @dataclass(frozen=True)
@@ -70,8 +83,8 @@ class ClosedLoop:
         By how much pulses come behind the law's step.
     full_rad : float or None
         Angle of the surface at an output of 1; None is the end of its travel.
-    yaw : YawStructure or None
-        Of the rudder, with its gains under ``yaw``.
+    pair : PairProblem or None
+        Aileron and rudder as they were tuned; the rudder's gains are under ``yaw``.
     coordinated : bool
         Whether pitch is fed the rate of a turn, as ArduPlane and PX4 do.
     """
@@ -82,8 +95,17 @@ class ClosedLoop:
     gains: Mapping[str, Mapping[str, float]]
     pulse_s: float = 0.5 * PULSE_PERIOD_S
     full_rad: float | None = None
-    yaw: YawStructure | None = None
+    pair: PairProblem | None = None
     coordinated: bool = True
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """Axes that a law drives."""
+        return AXES if self.pair is None else (*AXES, "yaw")
+
+    def full_travel_rad(self, axis: str) -> float:
+        """Return the angle of a surface at an output of 1."""
+        return self.full_rad or float(self.frame.surface_limit_rad[COMMANDS[axis]])
 
 
 @dataclass(frozen=True)
@@ -126,10 +148,10 @@ def fly(
     pulse_steps = max(round(PULSE_PERIOD_S / span), 1)
     first_pulse = round(loop.pulse_s / span)
     states: dict[str, Array] = {axis: np.zeros(laws[axis].states) for axis in AXES}
-    rudder = loop.yaw.loop(loop.gains["yaw"], speed) if loop.yaw else None
-    mix = loop.yaw.mix(loop.gains["yaw"]) if loop.yaw else 0.0
+    rudder = loop.pair.yaw.loop(loop.gains["yaw"], speed) if loop.pair else None
+    mix = loop.pair.yaw.mix(loop.gains["yaw"]) if loop.pair else 0.0
     damped: Array = np.zeros(rudder.states if rudder else 0)
-    moving = (*AXES, *(["yaw"] if rudder else []))
+    moving = loop.moving
     corner_hz = loop.laws["roll"].gyro_filter_hz
     gyro = {axis: _Filter(corner_hz, 1.0 / span) for axis in moving}
     air, gusts = np.zeros(9), np.zeros(GUST_STATES)
@@ -138,12 +160,12 @@ def fly(
     at_trim = {"roll": float(start[0]), "pitch": float(start[1])}
     count = round(demand.seconds / period)
     kept: dict[str, dict[str, list[float]]] = {
-        name: {axis: [] for axis in AXES} for name in ("angle", "output", "total", "surface")
+        name: {axis: [] for axis in moving} for name in ("angle", "output", "total", "surface")
     }
     work, moved = np.empty((5, len(x) + 4)), np.zeros(6)
     held = loop.trim.command.copy()
-    rates = dict.fromkeys(moving, 0.0)
-    total = dict.fromkeys(moving, 0.0)
+    full_rad = {axis: loop.full_travel_rad(axis) for axis in moving}
+    rates, outputs, total = (dict.fromkeys(moving, 0.0) for _ in range(3))
     lost = False
     for k in range(count):
         phi, theta, _ = (float(one) for one in euler(x[Q0 : Q3 + 1]))
@@ -160,22 +182,25 @@ def fly(
                 # The turn's own pitch rate is no error.
                 rate -= _turn_radps(phi, theta, float(np.hypot(x[U], x[W])))
             states[axis], out = laws[axis].step(states[axis], np.array(error), np.array(rate))
-            injected = demand.injected.get(axis)
-            total[axis] = float(out) + (0.0 if injected is None else float(injected[k]))
-            for name, value in (
-                ("angle", seen[axis]), ("output", float(out)), ("total", total[axis]),
-                ("surface", x[AILERON if axis == "roll" else ELEVATOR]),
-            ):  # fmt: skip
-                kept[name][axis].append(float(value))
+            outputs[axis] = float(out)
         if rudder:
             damped, out = rudder.step(damped, np.array(-phi), np.array(rates["yaw"]))
-            total["yaw"] = float(out) + mix * total["roll"]
+            # The law's own aileron is mixed: what is injected stands for its servo alone.
+            outputs["yaw"] = float(out) + mix * outputs["roll"]
+        for axis in moving:
+            injected = demand.injected.get(axis)
+            total[axis] = outputs[axis] + (0.0 if injected is None else float(injected[k]))
+            for name, value in (
+                ("angle", seen.get(axis, 0.0)), ("output", outputs[axis]), ("total", total[axis]),
+                ("surface", x[SURFACES[axis]]),
+            ):  # fmt: skip
+                kept[name][axis].append(float(value))
         for j in range(parts):
             if (k * parts + j - first_pulse) % pulse_steps == 0:
                 for axis in moving:
                     number = COMMANDS[axis]
                     limit = frame.surface_limit_rad[number]
-                    angle = min(max(total[axis] * (loop.full_rad or limit), -limit), limit)
+                    angle = min(max(total[axis] * full_rad[axis], -limit), limit)
                     held[number] = loop.trim.command[number] + angle * SENSE[axis]
             if turbulence_mps > 0.0:
                 noise = rng.standard_normal(4)
@@ -216,23 +241,3 @@ class _Filter:
         s[0] = b[1] * value - a[1] * out + s[1]
         s[1] = b[2] * value - a[2] * out
         return out
-
-
-def computed_parts(loop: ClosedLoop, axis: str) -> tuple[Any, float, float]:
-    """Return the aircraft's own linear system of an axis, its servo (Hz) and delay (s)."""
-    from host.aircraft.linearisation import linearise
-
-    linear = linearise(loop.frame, loop.trim)
-    if axis == "roll":
-        system = (
-            linear.lateral_a, linear.lateral_b[:, :1], ("v_mps", "p_radps", "r_radps", "phi_rad")
-        )  # fmt: skip
-    else:
-        system = (
-            linear.longitudinal_a, linear.longitudinal_b,
-            ("u_mps", "w_mps", "q_radps", "theta_rad"),
-        )  # fmt: skip
-    period = loop.laws[axis].loop(loop.gains[axis], loop.trim.airspeed_mps).period_s
-    # A law as slow as the pulses waits for the next; a faster one is held by half a pulse more.
-    delay = loop.pulse_s if period >= PULSE_PERIOD_S else 0.5 * PULSE_PERIOD_S
-    return system, loop.frame.servo_bandwidth_radps / (2.0 * math.pi), delay

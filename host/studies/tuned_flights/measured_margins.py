@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
+from host.aircraft.linearisation import Linear, linearise
+from host.aircraft.trim import Trim
 from host.arrays import Array
+from host.control.actuator import PULSE_PERIOD_S
+from host.control.lateral_pair import PairScenarios, pair_system
 from host.control.margins import Margins, margins
 from host.control.plant import continuous, sampled
 from host.control.scenarios import law_response
 
-from studies.tuned_flights.closed_loop_flight import (
-    COMMANDS,
-    SENSE,
-    ClosedLoop,
-    Demand,
-    computed_parts,
-    fly,
-)
+from studies.tuned_flights.closed_loop_flight import SENSE, ClosedLoop, Demand, fly
 
 PERIOD_S = 20.0
 SETTLED_PERIODS = 1
 LOWEST_HZ, HIGHEST_HZ, COUNT = 0.1, 16.0, 40
+LATERAL = ("v_mps", "p_radps", "r_radps", "phi_rad")
 LARGEST_SHARE = 0.08  # of travel: below saturation of travel and of the servo's rate
 
 
@@ -43,7 +42,7 @@ def sines(steps: int) -> Array:
 
 def measured(loop: ClosedLoop, axis: str) -> Margins:
     """Return the margins of one axis in calm air, from what comes back of injected sines."""
-    period = loop.laws[axis].loop(loop.gains[axis], loop.trim.airspeed_mps).period_s
+    period = loop.laws["roll"].loop(loop.gains["roll"], loop.trim.airspeed_mps).period_s
     steps = round(PERIOD_S / period)
     wave = sines(steps)
     demand = Demand(
@@ -62,17 +61,45 @@ def measured(loop: ClosedLoop, axis: str) -> Margins:
 
 def computed(loop: ClosedLoop, axis: str) -> Margins:
     """Return the margins of one axis of this very aircraft, from its equations at its trim."""
-    system, servo_hz, delay_s = computed_parts(loop, axis)
-    law = loop.laws[axis].loop(loop.gains[axis], loop.trim.airspeed_mps)
-    travel = loop.full_rad or float(loop.frame.surface_limit_rad[COMMANDS[axis]])
-    plant = sampled(
-        continuous(axis, system, travel, servo_hz, loop.laws[axis].gyro_filter_hz, SENSE[axis]),
-        delay_s,
-        law.period_s,
-    )
+    linear = linearise(loop.frame, loop.trim)
+    lead = "pitch" if axis == "pitch" else "roll"
+    law = loop.laws[lead]
+    own = law.loop(loop.gains[lead], loop.trim.airspeed_mps)
     # As far as sines were injected: beyond it nothing was measured.
     w = np.geomspace(2.0 * math.pi * LOWEST_HZ, 2.0 * math.pi * HIGHEST_HZ, 400)
-    w = w[w < 0.98 * np.pi / law.period_s]
-    by_angle, by_rate = law_response(law, w)
-    seen = plant.response(w)
-    return margins(-(by_angle * seen[:, 0] + by_rate * seen[:, 1])[None], w)
+    w = w[w < 0.98 * np.pi / own.period_s]
+    # A law as slow as the pulses waits for the next; a faster one is held by half a pulse more.
+    delay_s = loop.pulse_s if own.period_s >= PULSE_PERIOD_S else 0.5 * PULSE_PERIOD_S
+    servo_hz = loop.frame.servo_bandwidth_radps / (2.0 * math.pi)
+    if loop.pair is not None and axis != "pitch":
+        drives = np.array([[loop.full_travel_rad(one), servo_hz] for one in ("roll", "yaw")])
+        system = pair_system(
+            _by_sideslip(linear, loop.trim), drives, (SENSE["roll"], SENSE["yaw"]),
+            law.gyro_filter_hz,
+        )  # fmt: skip
+        plant = sampled(system, delay_s, own.period_s)
+        here = replace(loop.pair.roll, airspeeds_mps=(loop.trim.airspeed_mps,))
+        no_gusts = np.zeros((1, 1, len(w), 4), dtype=complex)
+        seen = PairScenarios(
+            replace(loop.pair, roll=here), w, ((plant,),), no_gusts, np.zeros((1, len(w)))
+        )
+        aileron, rudder, _ = seen.judged(loop.gains["yaw"])
+        return aileron if axis == "roll" else rudder
+    dynamics = (
+        (linear.longitudinal_a, linear.longitudinal_b, ("u_mps", "w_mps", "q_radps", "theta_rad"))
+        if axis == "pitch"
+        else (linear.lateral_a, linear.lateral_b[:, :1], LATERAL)
+    )
+    travel_rad = loop.full_travel_rad(axis)
+    system = continuous(axis, dynamics, travel_rad, servo_hz, law.gyro_filter_hz, SENSE[axis])
+    plant = sampled(system, delay_s, own.period_s)
+    by_angle, by_rate = law_response(own, w)
+    response = plant.response(w)
+    return margins(-(by_angle * response[:, 0] + by_rate * response[:, 1])[None], w)
+
+
+def _by_sideslip(linear: Linear, trim: Trim) -> tuple[Array, Array, tuple[str, ...]]:
+    """Return the lateral A, B and states with the sideslip in place of the side speed."""
+    scale = np.array([trim.airspeed_mps, 1.0, 1.0, 1.0])
+    a = linear.lateral_a * scale / scale[:, None]
+    return a, linear.lateral_b / scale[:, None], ("beta_rad", *LATERAL[1:])

@@ -190,7 +190,10 @@ def draw_pair(problem: PairProblem, *, seed: int, count: int) -> PairScenarios:
         row, blown = [], []
         for one, drive in zip(values, drives, strict=True):
             a, b, states = roll.axis.matrices(one, airspeed)
-            system = _continuous(problem, a, b, states, drive)
+            senses = roll.axis.sense, problem.sense
+            system = pair_system(
+                (a, b, states), drive[:, :2], senses, roll.structure.gyro_filter_hz
+            )
             # One output stage: both surfaces wait as long.
             row.append(sampled(system, float(drive[0, 2]), roll.period_s))
             (column, power), *_ = gust_inputs("yaw", a, states, airspeed, roll.span_m, w)
@@ -204,21 +207,35 @@ def draw_pair(problem: PairProblem, *, seed: int, count: int) -> PairScenarios:
     return PairScenarios(problem, w, tuple(plants), np.array(gusts), np.array(powers))
 
 
-def _continuous(
-    problem: PairProblem, a: Array, b: Array, states: tuple[str, ...], drive: Array
+def pair_system(
+    dynamics: tuple[Array, Array, tuple[str, ...]],
+    drives: Array,
+    senses: tuple[float, float],
+    gyro_filter_hz: float,
 ) -> tuple[Array, Array, Array]:
-    """Return A, B, C from two shares of travel to bank, filtered p and r, and sideslip."""
+    """Return A, B, C from two shares of travel to bank, filtered p and r, and sideslip.
+
+    Parameters
+    ----------
+    dynamics : tuple
+        A, B of aileron and rudder, and the names of the states, ``beta_rad`` among them.
+    drives : Array, shape (2, 2)
+        Travel (rad) and bandwidth (Hz) of either servo.
+    senses : tuple of float
+        1 or -1: sign of either surface's moment.
+    gyro_filter_hz : float
+    """
+    a, b, states = dynamics
     n = len(states)
     total = n + 2 + 4
     full, into, out = np.zeros((total, total)), np.zeros((total, 2)), np.zeros((4, total))
     full[:n, :n] = a
-    senses = problem.roll.axis.sense, problem.sense
-    for k, ((travel_rad, bandwidth_hz, _), sense) in enumerate(zip(drive, senses, strict=True)):
+    for k, ((travel_rad, bandwidth_hz), sense) in enumerate(zip(drives, senses, strict=True)):
         lag = 2.0 * math.pi * bandwidth_hz
         full[:n, n + k] = b[:, k] * sense
         full[n + k, n + k] = -lag
         into[n + k, k] = lag * travel_rad
-    corner = 2.0 * math.pi * problem.roll.structure.gyro_filter_hz
+    corner = 2.0 * math.pi * gyro_filter_hz
     for k, (row, rate) in enumerate(((P, "p_radps"), (R, "r_radps"))):
         low = n + 2 + 2 * k
         full[low, low + 1] = 1.0
