@@ -14,13 +14,14 @@ import math
 import os
 import sys
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as `host identify` does
 
 from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 from host.aircraft.linear_aircraft import load
@@ -51,11 +52,13 @@ SERVO_SHARE, BACK_SHARE = 0.5, 0.03  # servo at half speed, CG 3 % of the chord 
 OUTSIDE_DB, OUTSIDE_DEG = 1.5, 8.0  # of the margins computed: an outlier, which is named
 GYRO_NOISE_RADPS = 0.002
 PROCESSES = 2
+SIDE_BY_SIDE = 25  # aircraft: INAV's 2 kHz write 200 MB of their histories
 OTHER_PART = 4  # default gains and those of PX4's autotune fly on every fourth of the aircraft
 FIRST_SEED = 48_000
 COLUMNS = ("case", "flights", "lost", "moving at the end", "rise s", "overshoot %", "settled s",
            "surface rad/s rms", "dB off", "deg off", "95 % within")  # fmt: skip
 Gains = Mapping[str, Mapping[str, float]]
+Result = TypeVar("Result")
 
 
 def tuned(autopilot: str, seed: int) -> Tuning:
@@ -147,18 +150,27 @@ class Craft:
         return ClosedLoop(frame, at, self.laws, self.gains, pulse_s, self.full_rad, self.pair)
 
     def fly(
-        self, seed: int, *, speed: float, demand: Demand, gusts: float, changes: tuple[float, ...]
-    ) -> Flown:
-        """Return the flight of one."""
-        loop = self.loop(seed, speed, *changes)
+        self,
+        seeds: Sequence[int],
+        *,
+        speed: float,
+        demand: Demand,
+        gusts: float,
+        changes: tuple[float, ...],
+    ) -> list[Flown]:
+        """Return the flights of some."""
+        loops = [self.loop(seed, speed, *changes) for seed in seeds]
         noise = GYRO_NOISE_RADPS if gusts else 0.0
-        return fly(loop, demand, turbulence_mps=gusts, gyro_noise_radps=noise, seed=seed)
+        return fly(loops, demand, turbulence_mps=gusts, gyro_noise_radps=noise, seeds=seeds)
 
-    def off(self, seed: int, *, axis: str) -> Array:
-        """Return gain (dB) and phase margin (deg) of one, measured and computed, shape (2, 2)."""
-        loop = self.loop(seed, SPEEDS_MPS[1])
-        both = measured(loop, axis), computed(loop, axis)
-        return np.array([[one.gain_db[0], one.phase_deg[0]] for one in both])
+    def margins(self, seeds: Sequence[int], *, axis: str) -> Array:
+        """Return gain (dB) and phase margin (deg), measured and computed, shape (N, 2, 2)."""
+        loops = [self.loop(seed, SPEEDS_MPS[1]) for seed in seeds]
+        flown, known = measured(loops, axis), [computed(one, axis) for one in loops]
+        both = [flown.gain_db, flown.phase_deg], [
+            [float(one.gain_db[0]) for one in known], [float(one.phase_deg[0]) for one in known]
+        ]  # fmt: skip
+        return np.array(both).transpose(2, 0, 1)
 
 
 @dataclass(frozen=True)
@@ -192,8 +204,7 @@ class Flights:
 
     def _margins(self, axis: str) -> tuple[tuple[Cell, ...], list[str]]:
         """Return a row of measured minus computed margins, and a line of each outlier."""
-        found = self.processes.map(partial(self.craft.off, axis=axis), self.seeds)
-        both = np.array(list(found))
+        both = np.concatenate(self._shared(partial(self.craft.margins, axis=axis)))
         off = both[:, 0] - both[:, 1]
         outside = np.any(np.abs(off) > (OUTSIDE_DB, OUTSIDE_DEG), axis=1)
         within = np.quantile(np.abs(off), 0.95, axis=0)
@@ -214,8 +225,15 @@ class Flights:
         self, case: str, step: str, speed: float, gusts: float, changes: tuple[float, ...] = ()
     ) -> tuple[Cell, ...]:
         demand = STEPS[step]
-        one = partial(self.craft.fly, speed=speed, demand=demand, gusts=gusts, changes=changes)
-        return _row(case, list(self.processes.map(one, self.seeds)), demand, calm=not gusts)
+        some = partial(self.craft.fly, speed=speed, demand=demand, gusts=gusts, changes=changes)
+        flown = [one for part in self._shared(some) for one in part]
+        return _row(case, flown, demand, calm=not gusts)
+
+    def _shared(self, work: Callable[[Sequence[int]], Result]) -> list[Result]:
+        """Return what parts of the aircraft gave, as many at a time as memory takes."""
+        seeds = self.seeds
+        parts = [seeds[k : k + SIDE_BY_SIDE] for k in range(0, len(seeds), SIDE_BY_SIDE)]
+        return list(self.processes.map(work, parts))
 
 
 if __name__ == "__main__":

@@ -8,11 +8,11 @@ and the rudder where no damper is given.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from host.aircraft.air import GUST_STATES, Air, gust_step, turbulence
+from host.aircraft.air import GUST_STATES, Air, Turbulence, gust_step, turbulence
 from host.aircraft.airframe import (
     AILERON,
     ELEVATOR,
@@ -21,15 +21,15 @@ from host.aircraft.airframe import (
     RUDDER,
     Airframe,
     P,
-    Q,
-    R,
     U,
     W,
 )
+from host.aircraft.airframe import Array as State
 from host.aircraft.attitude import euler
 from host.aircraft.rigid_body import step
 from host.aircraft.trim import Trim
 from host.arrays import Array
+from host.compiled import compiled_fast
 from host.constants import GRAVITY_MPS2
 from host.control.actuator import PULSE_PERIOD_S
 from host.control.autopilots.structure import Structure
@@ -121,123 +121,175 @@ class Flown:
 
 
 def fly(
-    loop: ClosedLoop,
+    loops: Sequence[ClosedLoop],
     demand: Demand,
     *,
     turbulence_mps: float = 0.0,
     gyro_noise_radps: float = 0.0,
-    seed: int = 0,
-) -> Flown:
-    """Fly one aircraft from its trim.
+    seeds: Sequence[int] = (0,),
+) -> list[Flown]:
+    """Fly aircraft from their trims, side by side: the law is asked once for all of them.
 
     Parameters
     ----------
-    loop : ClosedLoop
+    loops : sequence of ClosedLoop
+        Of the same laws, gains and airspeed.
     demand : Demand
     turbulence_mps, gyro_noise_radps : float
         Standard deviations of the vertical gust and of the noise of each gyro.
-    seed : int
+    seeds : sequence of int
+        Of each aircraft's gusts and noise.
     """
-    rng = np.random.default_rng([seed, 48])
-    frame, x = loop.frame, loop.trim.state.copy()
-    speed = loop.trim.airspeed_mps
-    laws = {axis: loop.laws[axis].loop(loop.gains[axis], speed) for axis in AXES}
+    first, n = loops[0], len(loops)
+    moving, speed = first.moving, first.trim.airspeed_mps
+    laws = {axis: first.laws[axis].loop(first.gains[axis], speed) for axis in AXES}
+    rudder = first.pair.yaw.loop(first.gains["yaw"], speed) if first.pair else None
+    mix = first.pair.yaw.mix(first.gains["yaw"]) if first.pair else 0.0
     period = laws["roll"].period_s
     parts = math.ceil(period / LONGEST_STEP_S)
     span = period / parts
-    pulse_steps = max(round(PULSE_PERIOD_S / span), 1)
-    first_pulse = round(loop.pulse_s / span)
-    states: dict[str, Array] = {axis: np.zeros(laws[axis].states) for axis in AXES}
-    rudder = loop.pair.yaw.loop(loop.gains["yaw"], speed) if loop.pair else None
-    mix = loop.pair.yaw.mix(loop.gains["yaw"]) if loop.pair else 0.0
-    damped: Array = np.zeros(rudder.states if rudder else 0)
-    moving = loop.moving
-    corner_hz = loop.laws["roll"].gyro_filter_hz
-    gyro = {axis: _Filter(corner_hz, 1.0 / span) for axis in moving}
-    air, gusts = np.zeros(9), np.zeros(GUST_STATES)
-    dryden = turbulence(Air(turbulence_mps=turbulence_mps), HEIGHT_M)
-    start = euler(x[Q0 : Q3 + 1])
-    at_trim = {"roll": float(start[0]), "pitch": float(start[1])}
     count = round(demand.seconds / period)
-    kept: dict[str, dict[str, list[float]]] = {
-        name: {axis: [] for axis in moving} for name in ("angle", "output", "total", "surface")
+    pulse_steps = max(round(PULSE_PERIOD_S / span), 1)
+    since = np.arange(count * parts) - np.array([[round(one.pulse_s / span)] for one in loops])
+    pulses = (since % pulse_steps == 0).reshape(n, count, parts)
+    filters = np.array(butter(2, first.laws["roll"].gyro_filter_hz, fs=1.0 / span))
+    dryden = turbulence(Air(turbulence_mps=turbulence_mps), HEIGHT_M)
+    gusty = turbulence_mps > 0.0
+
+    x = np.array([one.trim.state for one in loops])
+    trims = np.array([one.trim.command for one in loops])
+    held, wanted = trims.copy(), trims.copy()
+    limits, full_rad = (
+        {axis: np.array([rad(one, axis) for one in loops]) for axis in moving}
+        for rad in (lambda one, axis: one.frame.surface_limit_rad[COMMANDS[axis]],
+                    ClosedLoop.full_travel_rad)
+    )  # fmt: skip
+    states: dict[str, Array] = {axis: np.zeros((n, law.states)) for axis, law in laws.items()}
+    damped: Array = np.zeros((n, rudder.states if rudder else 0))
+    rates, lagged = np.zeros((n, 3)), np.zeros((n, 3, 2))
+    gusts, air, work = np.zeros((n, GUST_STATES)), np.zeros(9), np.empty((5, x.shape[1] + 4))
+    noises = [np.random.default_rng([seed, 48]) for seed in seeds]
+    calm = np.zeros((parts, 7))
+    at_trim = euler(x[:, Q0 : Q3 + 1])
+    kept = {
+        name: {axis: np.zeros((n, count)) for axis in moving}
+        for name in ("angle", "output", "total", "surface")
     }
-    work, moved = np.empty((5, len(x) + 4)), np.zeros(6)
-    held = loop.trim.command.copy()
-    full_rad = {axis: loop.full_travel_rad(axis) for axis in moving}
-    rates, outputs, total = (dict.fromkeys(moving, 0.0) for _ in range(3))
-    lost = False
+    lost, outputs = np.zeros(n, dtype=bool), dict[str, Array]()
     for k in range(count):
-        phi, theta, _ = (float(one) for one in euler(x[Q0 : Q3 + 1]))
-        seen = {"roll": phi, "pitch": theta}
+        phi, theta, _ = euler(x[:, Q0 : Q3 + 1])
         stepped = k * period >= demand.at_s
+        seen = {"roll": phi, "pitch": theta}
         asked = {
-            "roll": at_trim["roll"] + demand.bank_rad * stepped,
-            "pitch": at_trim["pitch"] + demand.pitch_rad * stepped,
+            "roll": at_trim[0] + demand.bank_rad * stepped,
+            "pitch": at_trim[1] + demand.pitch_rad * stepped,
         }
-        for axis in AXES:
-            error = asked[axis] - seen[axis]
-            rate = rates[axis]
-            if axis == "pitch" and loop.coordinated:
+        for number, axis in enumerate(AXES):
+            rate = rates[:, number]
+            if axis == "pitch" and first.coordinated:
                 # The turn's own pitch rate is no error.
-                rate -= _turn_radps(phi, theta, float(np.hypot(x[U], x[W])))
-            states[axis], out = laws[axis].step(states[axis], np.array(error), np.array(rate))
-            outputs[axis] = float(out)
+                rate = rate - _turn_radps(phi, theta, np.hypot(x[:, U], x[:, W]))
+            states[axis], outputs[axis] = laws[axis].step(
+                states[axis], asked[axis] - seen[axis], rate
+            )
         if rudder:
-            damped, out = rudder.step(damped, np.array(-phi), np.array(rates["yaw"]))
+            damped, out = rudder.step(damped, -phi, rates[:, 2])
             # The law's own aileron is mixed: what is injected stands for its servo alone.
-            outputs["yaw"] = float(out) + mix * outputs["roll"]
+            outputs["yaw"] = out + mix * outputs["roll"]
         for axis in moving:
             injected = demand.injected.get(axis)
-            total[axis] = outputs[axis] + (0.0 if injected is None else float(injected[k]))
+            total = outputs[axis] + (0.0 if injected is None else injected[k])
+            angle = np.clip(total * full_rad[axis], -limits[axis], limits[axis])
+            number = COMMANDS[axis]
+            wanted[:, number] = trims[:, number] + angle * SENSE[axis]
             for name, value in (
-                ("angle", seen.get(axis, 0.0)), ("output", outputs[axis]), ("total", total[axis]),
-                ("surface", x[SURFACES[axis]]),
+                ("angle", seen.get(axis, phi)), ("output", outputs[axis]), ("total", total),
+                ("surface", x[:, SURFACES[axis]]),
             ):  # fmt: skip
-                kept[name][axis].append(float(value))
-        for j in range(parts):
-            if (k * parts + j - first_pulse) % pulse_steps == 0:
-                for axis in moving:
-                    number = COMMANDS[axis]
-                    limit = frame.surface_limit_rad[number]
-                    angle = min(max(total[axis] * full_rad[axis], -limit), limit)
-                    held[number] = loop.trim.command[number] + angle * SENSE[axis]
-            if turbulence_mps > 0.0:
-                noise = rng.standard_normal(4)
-                gust_step(dryden, gusts, noise, speed, frame.span_m, span, moved)
-                air[3:] = moved
-            step(frame, x, held, air, loop.trim.density_kgpm3, span, work)
-            for axis, number in zip(moving, (P, Q, R), strict=False):
-                noise_radps = gyro_noise_radps * rng.standard_normal() if gyro_noise_radps else 0.0
-                rates[axis] = gyro[axis].step(float(x[number]) + noise_radps)
-        if not np.isfinite(x).all() or abs(phi) > BANK_RAD or abs(theta) > PITCH_RAD:
-            lost = True
-            break
-    arrays = {
-        name: {axis: np.array(values) for axis, values in by.items()} for name, by in kept.items()
-    }
-    t = period * np.arange(len(arrays["angle"]["roll"]))
-    return Flown(t, arrays["angle"], arrays["output"], arrays["total"], arrays["surface"], lost)
+                kept[name][axis][:, k] = value
+        lost |= ~np.isfinite(x).all(axis=1)
+        lost |= (np.abs(phi) > BANK_RAD) | (np.abs(theta) > PITCH_RAD)
+        for i, one in enumerate(loops):
+            if lost[i]:
+                continue
+            noise = noises[i].standard_normal((parts, 7)) if gusty or gyro_noise_radps else calm
+            advance(
+                one.frame, x[i], held[i], wanted[i], pulses[i, k], air, dryden, gusty, gusts[i],
+                noise, gyro_noise_radps, filters, lagged[i], rates[i], speed,
+                one.trim.density_kgpm3, span, work,
+            )  # fmt: skip
+    t = period * np.arange(count)
+
+    def of(name: str, i: int) -> dict[str, Array]:
+        return {axis: rows[i] for axis, rows in kept[name].items()}
+
+    return [
+        Flown(t, of("angle", i), of("output", i), of("total", i), of("surface", i), bool(lost[i]))
+        for i in range(n)
+    ]
 
 
-def _turn_radps(phi: float, theta: float, airspeed_mps: float) -> float:
+@compiled_fast
+def advance(
+    frame: Airframe,
+    x: State,
+    held: State,
+    wanted: State,
+    pulses: State,
+    air: State,
+    dryden: Turbulence,
+    gusty: bool,
+    gusts: State,
+    noise: State,
+    gyro_noise_radps: float,
+    filters: State,
+    lagged: State,
+    rates: State,
+    speed_mps: float,
+    density_kgpm3: float,
+    step_s: float,
+    work: State,
+) -> None:
+    """Advance one aircraft by one period of the law, in place.
+
+    Parameters
+    ----------
+    frame : Airframe
+    x, held, wanted : Array
+        State; commands at the servos, and those that the next pulse brings.
+    pulses : State, shape (M,)
+        Whether one comes at each of the period's steps.
+    air : State, shape (9,)
+        Scratch: wind and gust.
+    dryden, gusty, gusts
+        Turbulence, whether there is any, and its filters' states.
+    noise : State, shape (M, 7)
+        Standard normal: four of the gusts, three of the gyros.
+    gyro_noise_radps : float
+    filters : State, shape (2, 3)
+        Numerator and denominator of the gyro's low-pass.
+    lagged, rates : State, shapes (3, 2), (3,)
+        Its states and outputs.
+    speed_mps, density_kgpm3, step_s : float
+    work : Array
+        Of `step`.
+    """
+    for j in range(pulses.shape[0]):
+        if pulses[j]:
+            for i in range(held.shape[0]):
+                held[i] = wanted[i]
+        if gusty:
+            gust_step(dryden, gusts, noise[j], speed_mps, frame.span_m, step_s, air[3:])
+        step(frame, x, held, air, density_kgpm3, step_s, work)
+        for i in range(3):
+            value = x[P + i] + gyro_noise_radps * noise[j, 4 + i]
+            out = filters[0, 0] * value + lagged[i, 0]
+            lagged[i, 0] = filters[0, 1] * value - filters[1, 1] * out + lagged[i, 1]
+            lagged[i, 1] = filters[0, 2] * value - filters[1, 2] * out
+            rates[i] = out
+
+
+def _turn_radps(phi: Array, theta: Array, airspeed_mps: Array) -> Array:
     """Return the pitch rate of a level turn at a bank angle."""
-    turn = GRAVITY_MPS2 / airspeed_mps * math.tan(phi) * math.sin(phi)
-    return turn * math.cos(theta)
-
-
-class _Filter:
-    """The gyro's low-pass of second order, sample by sample."""
-
-    def __init__(self, corner_hz: float, rate_hz: float) -> None:
-        b, a = butter(2, corner_hz, fs=rate_hz)
-        self._b: list[float] = [float(one) for one in b]
-        self._a: list[float] = [float(one) for one in a]
-        self._state = [0.0, 0.0]
-
-    def step(self, value: float) -> float:
-        b, a, s = self._b, self._a, self._state
-        out = b[0] * value + s[0]
-        s[0] = b[1] * value - a[1] * out + s[1]
-        s[1] = b[2] * value - a[2] * out
-        return out
+    turn = GRAVITY_MPS2 / airspeed_mps * np.tan(phi) * np.sin(phi)
+    return np.asarray(turn * np.cos(theta))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -40,23 +41,30 @@ def sines(steps: int) -> Array:
     return np.asarray(LARGEST_SHARE * wave / np.max(np.abs(wave)))
 
 
-def measured(loop: ClosedLoop, axis: str) -> Margins:
-    """Return the margins of one axis in calm air, from what comes back of injected sines."""
-    period = loop.laws["roll"].loop(loop.gains["roll"], loop.trim.airspeed_mps).period_s
+def measured(loops: Sequence[ClosedLoop], axis: str) -> Margins:
+    """Return the margins of one axis in calm air, from what comes back of injected sines.
+
+    Those of a lost aircraft are 0.
+    """
+    first = loops[0]
+    period = first.laws["roll"].loop(first.gains["roll"], first.trim.airspeed_mps).period_s
     steps = round(PERIOD_S / period)
     wave = sines(steps)
     demand = Demand(
         seconds=(SETTLED_PERIODS + 1) * PERIOD_S,
         injected={axis: np.tile(wave, SETTLED_PERIODS + 1)},
     )
-    flown = fly(loop, demand)
-    if flown.lost:
-        lost = np.zeros(1)
-        return Margins(lost, lost, lost, lost)
+    flown = fly(loops, demand)
     cycles = harmonics().astype(int)
-    back = np.fft.rfft(flown.output[axis][-steps:])[cycles]
-    total = np.fft.rfft(flown.total[axis][-steps:])[cycles]
-    return margins((-back / total)[None], 2.0 * np.pi * cycles / PERIOD_S)
+    back, total = (
+        np.fft.rfft([one[axis][-steps:] for one in kept])[:, cycles]
+        for kept in ([one.output for one in flown], [one.total for one in flown])
+    )
+    kept = np.array([not one.lost for one in flown])
+    with np.errstate(all="ignore"):  # of a lost one there may be nothing
+        found = margins(-back / total, 2.0 * np.pi * cycles / PERIOD_S)
+    return Margins(*(np.where(kept, one, 0.0) for one in (
+        found.gain_db, found.phase_deg, found.disk, found.crossover_radps)))  # fmt: skip
 
 
 def computed(loop: ClosedLoop, axis: str) -> Margins:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import control
 import numpy as np
 import pytest
 from host.arrays import Array
@@ -26,7 +27,7 @@ from host.control.parameter_file import Change, taken_back
 from host.control.scenarios import Problem, draw
 from host.control.tuning import Tuning
 from host.control.uncertain_axis import UncertainAxis
-from host.control.verification import Required, verify
+from host.control.verification import Required, control_margins, verify
 from host.control.yaw_design import PairMargins, YawDesign
 from host.sysid.models import Trim
 
@@ -49,6 +50,17 @@ def rolling(share: float) -> UncertainAxis:
 def problem(share: float, *speeds: float, autopilot: str = "ardupilot") -> Problem:
     structure = AUTOPILOTS[autopilot].structure("roll", {}, 15.0)
     return Problem(rolling(share), DRIVE, structure, speeds or (15.0,), 1.3)
+
+
+def test_margins_of_every_loop_are_those_of_python_control() -> None:
+    seen = draw(problem(0.3, 12.0, 20.0), seed=8, count=20)
+    gains = seen.problem.structure.completed({"P": 0.2, "D": 0.004, "TC": 0.4}, 0.17)
+    w = seen.frequency_radps
+    for loops, own in zip(seen.loops(gains), seen.judged(gains), strict=True):
+        others = np.array([control_margins(control, one, w) for one in loops]).T
+        assert own.gain_db == pytest.approx(others[0], abs=0.05)
+        assert own.phase_deg == pytest.approx(others[1], abs=0.5)
+        assert np.ptp(own.gain_db) > 1.0
 
 
 def test_feed_forward_is_roll_damping_over_aileron() -> None:

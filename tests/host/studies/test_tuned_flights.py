@@ -31,7 +31,7 @@ def ultrastick(p: float, pulse_s: float = 0.013) -> ClosedLoop:
 @pytest.mark.parametrize("axis", AXES)
 def test_margins_of_injected_sines_are_those_that_are_computed(axis: str) -> None:
     loop = ultrastick(0.12)
-    flown, known = measured(loop, axis), computed(loop, axis)
+    flown, known = measured([loop], axis), computed(loop, axis)
     assert flown.gain_db == pytest.approx(known.gain_db, abs=0.3)
     assert flown.phase_deg == pytest.approx(known.phase_deg, abs=3.0)
     # It could fail: the loop of pulses that come 10 ms later is another.
@@ -54,7 +54,7 @@ def test_margins_are_measured_with_the_rudder_flying_too(axis: str) -> None:
     pair = PairProblem(rolling(), plain.gains["roll"], drive, ardupilot_yaw.structure({}, 17.0))
     gains = {**plain.gains, "yaw": {"DAMP": 1.0, "MIX": 0.5}}
     loop = replace(plain, gains=gains, pair=pair)
-    flown, known = measured(loop, axis), computed(loop, axis)
+    flown, known = measured([loop], axis), computed(loop, axis)
     assert flown.gain_db == pytest.approx(known.gain_db, abs=0.3)
     assert flown.phase_deg == pytest.approx(known.phase_deg, abs=3.0)
     # It could fail: with pulses 10 ms earlier the loop is another.
@@ -89,7 +89,7 @@ def test_a_linear_aircraft_that_answers_the_other_way_is_lost() -> None:
 
 def test_a_bank_of_thirty_degrees_is_reached_and_held() -> None:
     demand = Demand(bank_rad=0.5236)
-    flown = fly(ultrastick(0.12), demand)
+    (flown,) = fly([ultrastick(0.12)], demand)
     rise_s, overshoot, settled_s, _ = step_figures(flown, demand)
     assert 0.2 < rise_s < 1.5
     assert overshoot < 10.0
@@ -99,5 +99,5 @@ def test_a_bank_of_thirty_degrees_is_reached_and_held() -> None:
 
 def test_a_gain_above_the_margin_is_lost_or_keeps_swinging() -> None:
     known = computed(ultrastick(0.12), "roll").gain_db[0]
-    flown = fly(ultrastick(0.12 * 10 ** ((known + 3.0) / 20.0)), Demand(bank_rad=0.1))
+    (flown,) = fly([ultrastick(0.12 * 10 ** ((known + 3.0) / 20.0))], Demand(bank_rad=0.1))
     assert flown.lost or moving_at_the_end(flown)

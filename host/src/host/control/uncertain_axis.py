@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,7 @@ from host.arrays import Array
 from host.constants import NORMAL_95
 from host.control.control_error import ControlError
 from host.control.plant import RATES
-from host.sysid.models import Trim, template
+from host.sysid.models import LinearModel, Trim, template
 
 if TYPE_CHECKING:
     from host.sysid.pipeline import Identification
@@ -78,7 +79,7 @@ class UncertainAxis:
         airspeed_mps : float
         """
         at = Trim(airspeed_mps, self.trim.alpha_rad, self.trim.theta_rad)
-        model = template(self.template, at, accelerometers=True)
+        model = _model(self.template, at)
         ratio = airspeed_mps / self.trim.airspeed_mps
         scaled = {
             name: value * ratio ** POWERS[name]
@@ -98,6 +99,12 @@ class UncertainAxis:
         """Return the 95 % half-width of one derivative."""
         k = self.names.index(name)
         return NORMAL_95 * float(np.sqrt(self.covariance[k, k]))
+
+
+@cache
+def _model(name: str, at: Trim) -> LinearModel:
+    """Return a template; thousands of aircraft are drawn of one."""
+    return template(name, at, accelerometers=True)
 
 
 def axes_of(identified: Identification) -> dict[str, UncertainAxis]:
