@@ -232,12 +232,12 @@ def _scenario(
     plant = sampled(system, delay_s, problem.period_s)
     a, _, c = system
     left = 1j * w[:, None, None] * np.eye(len(a)) - a
-    gusts = []
     found = gust_inputs(axis, dynamics[0], dynamics[2], airspeed_mps, problem.span_m, w)
-    for column, spectrum in found:
-        into = np.zeros((len(w), len(a), 1), dtype=complex)
-        into[:, : len(column)] = column
-        gusts.append(((c @ np.linalg.solve(left, into))[..., 0], spectrum))
+    into = np.zeros((len(a), len(found)), dtype=complex)
+    for k, (column, _) in enumerate(found):
+        into[: len(column), k] = column[:, 0]
+    moved = c @ np.linalg.solve(left, into)
+    gusts = [(moved[..., k], spectrum) for k, (_, spectrum) in enumerate(found)]
     lag = 2.0 * np.pi * bandwidth_hz
     surface = travel_rad * 1j * w * lag / (1j * w + lag)
     return Scenario(plant, plant.response(w), tuple(gusts), surface)

@@ -17,7 +17,7 @@ import numpy as np
 from host.arrays import Array
 from host.control.autopilots import parameter_table
 from host.control.autopilots.parameter_table import smoothing
-from host.control.autopilots.structure import Setting
+from host.control.autopilots.tabled import TabledAxis
 
 ELEVONS, V_TAIL = {77, 78}, {79, 80}  # SERVOn_FUNCTION
 MIXED = {"roll": ELEVONS, "pitch": ELEVONS | V_TAIL, "yaw": V_TAIL}
@@ -67,26 +67,20 @@ class ArduPlaneLoop:
 
 
 @dataclass(frozen=True)
-class ArduPlane:
-    """One axis of ArduPlane: its parameters, and those of the log that stay.
+class ArduPlane(TabledAxis):
+    """One axis of ArduPlane.
 
     Attributes
     ----------
-    axis : str
-    fixed : mapping
-        Filters, loop rate and speeds; the log's own where it has them.
     trim_mps : float
         Airspeed of the model.
     share : float
         Of the surface's travel that full output is, below 1 where a mixer halves it.
     """
 
-    axis: str
-    fixed: Mapping[str, float]
     trim_mps: float
     share: float = 1.0
-    searched: ClassVar[tuple[str, ...]] = ("P", "D", "TC")
-    fastest: ClassVar[str] = "actuator"
+    autopilot: ClassVar[str] = "ardupilot"
 
     def completed(self, chosen: Mapping[str, float], feed_forward: float) -> dict[str, float]:
         """Return every gain: FF undoes the aircraft at its trim, I is as AUTOTUNE sets it.
@@ -100,16 +94,6 @@ class ArduPlane:
         p = chosen["P"]
         i = min(p, ff) if self.axis == "roll" else max(0.75 * p, ff)
         return {**chosen, "FF": ff, "I": known["I"].rounded(i)}
-
-    @property
-    def settings(self) -> Mapping[str, Setting]:
-        """Parameters that are tuned."""
-        return parameter_table.settings("ardupilot", self.axis)
-
-    @property
-    def gyro_filter_hz(self) -> float:
-        """INS_GYRO_FILTER."""
-        return self.fixed["gyro_filter_hz"]
 
     @property
     def slew_limit_per_s(self) -> float:

@@ -16,7 +16,7 @@ from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.control.autopilots import parameter_table
 from host.control.autopilots.ardupilot import FULL_RAD, LOGGED, PREFIX, mixer_share, speed_scaler
-from host.control.autopilots.structure import Setting
+from host.control.autopilots.tabled import TabledRudder
 
 WASHED_OUT = 0.003992  # a step, whatever the loop's rate: 0.2 rad/s at 50 Hz
 
@@ -38,18 +38,11 @@ class ArduPlaneYawLoop:
 
 
 @dataclass(frozen=True)
-class ArduPlaneYaw:
-    """Rudder of ArduPlane: its parameters, and those of the log that stay."""
+class ArduPlaneYaw(TabledRudder):
+    """Rudder of ArduPlane."""
 
-    fixed: Mapping[str, float]
-    share: float
-    aileron_share: float
+    autopilot: ClassVar[str] = "ardupilot"
     damper: ClassVar[str] = "DAMP"
-
-    @property
-    def settings(self) -> Mapping[str, Setting]:
-        """Parameters that are tuned."""
-        return parameter_table.settings("ardupilot", "yaw")
 
     def completed(self, damper: float, mix: float, feed_forward: float) -> dict[str, float]:
         """Return every gain; the damper has no feed-forward."""
@@ -61,10 +54,6 @@ class ArduPlaneYaw:
         damping = gains["DAMP"] * scaler**2 / FULL_RAD * self.share
         slowest = max(airspeed_mps, self.fixed["airspeed_min_mps"])
         return ArduPlaneYawLoop(damping, GRAVITY_MPS2 / slowest, 1.0 / self.fixed["loop_hz"])
-
-    def mix(self, gains: Mapping[str, float]) -> float:
-        """Return the share of rudder travel per share of aileron travel."""
-        return gains["MIX"] * self.share / self.aileron_share
 
 
 def structure(logged: Mapping[str, float], trim_mps: float) -> ArduPlaneYaw:

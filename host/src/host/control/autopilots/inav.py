@@ -17,7 +17,7 @@ import numpy as np
 from host.arrays import Array
 from host.control.autopilots import parameter_table
 from host.control.autopilots.parameter_table import smoothing
-from host.control.autopilots.structure import Setting
+from host.control.autopilots.tabled import TabledAxis
 
 FULL = 500.0  # of the axis' output: full travel
 P_DIVISOR, I_DIVISOR, D_DIVISOR, FF_DIVISOR, LEVEL_DIVISOR = 31.0, 4.0, 1905.0, 31.0, 6.56
@@ -84,21 +84,14 @@ class InavLoop:
 
 
 @dataclass(frozen=True)
-class Inav:
-    """One axis of INAV: its parameters, and those that stay.
+class Inav(TabledAxis):
+    """One axis of INAV.
 
     The attitude gain fw_p_level belongs to roll and pitch alike: it stays as it is.
     """
 
-    axis: str
-    fixed: Mapping[str, float]
+    autopilot: ClassVar[str] = "inav"
     searched: ClassVar[tuple[str, ...]] = ("P", "D")
-    fastest: ClassVar[str] = "actuator"
-
-    @property
-    def settings(self) -> Mapping[str, Setting]:
-        """Parameters that are tuned."""
-        return parameter_table.settings("inav", self.axis)
 
     def completed(self, chosen: Mapping[str, float], feed_forward: float) -> dict[str, float]:
         """Return every gain: FF undoes the aircraft at its trim, I restores it within a second.
@@ -109,16 +102,6 @@ class Inav:
         share = feed_forward * FULL / math.degrees(1.0)
         ff, i = known["FF"].rounded(share * FF_DIVISOR), known["I"].rounded(share * I_DIVISOR)
         return {**chosen, "FF": ff, "I": i}
-
-    @property
-    def gyro_filter_hz(self) -> float:
-        """gyro_main_lpf_hz; of second order, the slower of its kinds."""
-        return self.fixed["gyro_filter_hz"]
-
-    @property
-    def slew_limit_per_s(self) -> float:
-        """None."""
-        return math.inf
 
     def loop(self, gains: Mapping[str, float], airspeed_mps: float) -> InavLoop:
         """Return the axis with gains; no airspeed changes them."""

@@ -11,7 +11,6 @@ behind the gyro's low-pass, whose 4.8 ms make its angles another period older.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -20,7 +19,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.control.autopilots import parameter_table
-from host.control.autopilots.structure import Setting
+from host.control.autopilots.tabled import TabledAxis
 
 FULL_RAD = 1.0  # of surface: the unit of the law's output
 # The University of Minnesota flew 0.64 / 0.20 in roll and 0.90 / 0.30 in pitch (OpenFlight,
@@ -45,32 +44,16 @@ class MegaLoop:
 
 
 @dataclass(frozen=True)
-class Mega:
-    """One axis of the logger's hold."""
+class Mega(TabledAxis):
+    """One axis of the logger's hold; a card's rate limit is its own."""
 
-    axis: str
-    fixed: Mapping[str, float]
+    autopilot: ClassVar[str] = "mega"
     searched: ClassVar[tuple[str, ...]] = ("P", "D")
     fastest: ClassVar[str] = "attitude"
-
-    @property
-    def settings(self) -> Mapping[str, Setting]:
-        """Gains that are tuned."""
-        return parameter_table.settings("mega", self.axis)
 
     def completed(self, chosen: Mapping[str, float], feed_forward: float) -> dict[str, float]:
         """Return every gain: the integral restores an error within three seconds."""
         return {**chosen, "I": self.settings["I"].rounded(chosen["P"] / INTEGRAL_S)}
-
-    @property
-    def gyro_filter_hz(self) -> float:
-        """Of the MPU-6000."""
-        return self.fixed["gyro_filter_hz"]
-
-    @property
-    def slew_limit_per_s(self) -> float:
-        """None: a card's rate limit is its own."""
-        return math.inf
 
     def loop(self, gains: Mapping[str, float], airspeed_mps: float) -> MegaLoop:
         """Return the axis with gains; no airspeed changes them."""

@@ -7,7 +7,6 @@ is the gyro's, behind a first-order filter (sensors/vehicle_angular_velocity).
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -18,7 +17,7 @@ import numpy as np
 from host.arrays import Array
 from host.control.autopilots import parameter_table
 from host.control.autopilots.parameter_table import smoothing
-from host.control.autopilots.structure import Setting
+from host.control.autopilots.tabled import TabledAxis
 
 LOGGED = {
     "airspeed_trim_mps": "FW_AIRSPD_TRIM",
@@ -85,20 +84,12 @@ class Px4Loop:
 
 
 @dataclass(frozen=True)
-class Px4:
-    """One axis of PX4: its parameters, and those of the log that stay."""
+class Px4(TabledAxis):
+    """One axis of PX4: share of travel that a torque of 1 makes, airspeed of the model."""
 
-    axis: str
-    fixed: Mapping[str, float]
     share: float
     trim_mps: float
-    searched: ClassVar[tuple[str, ...]] = ("P", "D", "TC")
-    fastest: ClassVar[str] = "actuator"
-
-    @property
-    def settings(self) -> Mapping[str, Setting]:
-        """Parameters that are tuned."""
-        return parameter_table.settings("px4", self.axis)
+    autopilot: ClassVar[str] = "px4"
 
     def completed(self, chosen: Mapping[str, float], feed_forward: float) -> dict[str, float]:
         """Return every gain: FF undoes the aircraft at its trim, I restores it within a second.
@@ -109,16 +100,6 @@ class Px4:
         torque = feed_forward / (self.share * speed_scale(self.trim_mps, self.fixed))
         ff = known["FF"].rounded(torque)
         return {**chosen, "FF": ff, "I": known["I"].rounded(torque)}
-
-    @property
-    def gyro_filter_hz(self) -> float:
-        """IMU_GYRO_CUTOFF, of second order."""
-        return self.fixed["gyro_filter_hz"]
-
-    @property
-    def slew_limit_per_s(self) -> float:
-        """None."""
-        return math.inf
 
     def loop(self, gains: Mapping[str, float], airspeed_mps: float) -> Px4Loop:
         """Return the axis with gains at an airspeed."""

@@ -19,23 +19,16 @@ from host.control.autopilots.px4 import (
     share_per_torque,
     speed_scale,
 )
-from host.control.autopilots.structure import Setting
+from host.control.autopilots.tabled import TabledRudder
 
 
 @dataclass(frozen=True)
-class Px4Yaw:
-    """Rudder of PX4: its parameters, and those of the log that stay."""
+class Px4Yaw(TabledRudder):
+    """Rudder of PX4."""
 
-    fixed: Mapping[str, float]
-    share: float
-    aileron_share: float
     trim_mps: float
+    autopilot: ClassVar[str] = "px4"
     damper: ClassVar[str] = "P"
-
-    @property
-    def settings(self) -> Mapping[str, Setting]:
-        """Parameters that are tuned."""
-        return parameter_table.settings("px4", "yaw")
 
     def completed(self, damper: float, mix: float, feed_forward: float) -> dict[str, float]:
         """Return every gain: FF holds the trim's turn; FW_YR_I, in steps of 0.5, stays."""
@@ -51,10 +44,6 @@ class Px4Yaw:
         return Px4Loop(
             {**gains, **fixed}, speed_scale(airspeed_mps, self.fixed), self.fixed, self.share
         )
-
-    def mix(self, gains: Mapping[str, float]) -> float:
-        """Return the share of rudder travel per share of aileron travel."""
-        return gains["MIX"] * self.share / self.aileron_share
 
 
 def structure(logged: Mapping[str, float], trim_mps: float) -> Px4Yaw:
