@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from host.live.flight_state import FlightState
+from host.live.gps_fix import fix_of_frame
 from host.live.link_budget import LinkBudget
 from host.live.live_sample import LIVE_UNITS, LiveUpdate
 from host.live.live_stream import LiveStream
@@ -81,7 +82,7 @@ def test_wind_is_what_circles_leave() -> None:
             v_east=round(100 * (speed * np.sin(psi) + wind_east)),
             v_north=round(100 * (speed * np.cos(psi) + wind_north)),
         )[0]  # fmt: skip
-        track.add(schema, row, speed, 0.0, psi)
+        track.add(fix_of_frame(schema, row, 0.0), speed, 0.0, psi)
     assert track.wind_mps == pytest.approx((wind_east, wind_north), abs=0.1)
     assert track.points[-1] == pytest.approx((0.0, 0.0, 0.0))
 
@@ -90,18 +91,19 @@ def test_a_pitot_blown_into_on_the_ground_is_no_wind() -> None:
     track, schema = LiveTrack(), packed_schema()
     row = rows("gps", 1, fix=number("gps_fix", "fix_3d"), v_east=30, v_north=-140)[0]  # carried
     for _ in range(50):
-        track.add(schema, row, 24.0, 0.1, 1.0)
+        track.add(fix_of_frame(schema, row, 0.0), 24.0, 0.1, 1.0)
     assert track.wind_mps is None
     assert len(track.points) == 50
 
 
 def test_no_wind_on_the_ground_and_no_track_without_a_fix() -> None:
     track, schema = LiveTrack(), packed_schema()
-    track.add(schema, rows("gps", 1, fix=number("gps_fix", "none"))[0], 16.0, 0.0, 0.0)
+    none = rows("gps", 1, fix=number("gps_fix", "none"))[0]
+    track.add(fix_of_frame(schema, none, 0.0), 16.0, 0.0, 0.0)
     assert track.points == []
-    row = rows("gps", 1, fix=number("gps_fix", "fix_3d"))[0]
-    track.add(schema, row, 1.0, 0.0, 0.0)
-    track.add(schema, row, float("nan"), 0.0, 0.0)
+    fix = fix_of_frame(schema, rows("gps", 1, fix=number("gps_fix", "fix_3d"))[0], 0.0)
+    track.add(fix, 1.0, 0.0, 0.0)
+    track.add(fix, float("nan"), 0.0, 0.0)
     assert track.wind_mps is None
 
 

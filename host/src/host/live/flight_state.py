@@ -13,6 +13,7 @@ from typing import Any
 
 from host.constants import RAD_PER_DEG
 from host.live.doubtful_values import DoubtfulValues
+from host.live.gps_fix import GpsFix
 from host.live.link_budget import LinkBudget
 from host.live.live_sample import LiveUpdate, SlowFrame
 from host.live.live_stream import LiveStream
@@ -43,6 +44,7 @@ class FlightState:
         self.preflight: Callable[[], dict[str, Any]] | None = None  # what one says, where there is
         self.events: deque[dict[str, Any]] = deque(maxlen=_EVENTS)
         self._stream = stream
+        self._fix: tuple[GpsFix, float] | None = None  # and when it came
         self._last: dict[str, SlowFrame] = {}
         self._heard_s: dict[str, float] = {}
         self._blocks: tuple[int, float] | None = None  # and when they last grew
@@ -111,8 +113,9 @@ class FlightState:
                 self._event(frame)
             elif frame.name == "system":
                 self._written(int(frame.row["blocks_written"]))
-            elif frame.name == "gps" and self._stream.schema is not None:
-                self.track.add(self._stream.schema, frame.row, *self._motion())
+        for fix in update.fixes:
+            self._fix = fix, time.monotonic()
+            self.track.add(fix, *self._motion())
 
     def _motion(self) -> tuple[float, float, float]:
         pair = [self._row.get(f"airspeed_{side}_mps", math.nan) for side in "ab"]
@@ -175,18 +178,20 @@ class FlightState:
         return round(value) if math.isfinite(value) else None
 
     def _gps(self) -> dict[str, Any]:
-        frame, schema = self._last.get("gps"), self._stream.schema
-        if frame is None or schema is None:
+        if self._fix is None:
             return {}
+        fix, heard_s = self._fix
         return {
-            "age_s": round(time.monotonic() - self._heard_s["gps"], 1),
-            "fix": schema.word("gps_fix", int(frame.row["fix"])).replace("_", " "),
-            "satellites": int(frame.row["satellites"]),
-            "speed_mps": int(frame.row["ground_speed"]) * 0.01,
+            "age_s": round(time.monotonic() - heard_s, 1),
+            "fix": fix.word.replace("_", " "),
+            "satellites": fix.satellites,
+            "speed_mps": fix.ground_speed_mps,
         }
 
     def _who(self) -> dict[str, str]:
         out = {}
+        if self._stream.text_variant:
+            out = {"board": "original rows,", "firmware": self._stream.text_variant}
         for name, field in (
             ("identity", "board"),
             ("identity", "firmware"),

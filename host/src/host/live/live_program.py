@@ -26,6 +26,7 @@ from host.live.logger_learning import LoggerLearning
 from host.live.mavlink_bridge import MavlinkBridge
 from host.live.plotjuggler_bridge import PlotJugglerBridge
 from host.live.recording_watch import RecordingWatch
+from host.live.replay import ReplaySource
 from host.log.capture_head import SUFFIX, CaptureHead
 from host.physical.calibration import Calibration, calibration_of_text, load_calibration
 from host.wire.schema_text import packed_schema
@@ -88,9 +89,10 @@ def run_live(
     if own and request.calibration is None:
         calibration = calibration_of_text(own, Path(source.name))
     texts = [packed_schema().text]
+    row_rate_hz = source.row_rate_hz if isinstance(source, ReplaySource) else None
     capture = _capture(request, source, calibration)
     with capture if capture is not None else contextlib.nullcontext():
-        session = LiveSession(source, LiveStream(calibration, texts), capture, tell)
+        session = LiveSession(source, LiveStream(calibration, texts, row_rate_hz), capture, tell)
         if capture is not None:
             tell(f"every byte goes to {capture.path}")
         leave = [join(session, calibration) for join in request.joins]

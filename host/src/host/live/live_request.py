@@ -19,7 +19,7 @@ from host.live.live_sources import (
     port_source,
     udp_source,
 )
-from host.live.replay import RADIO_RATE_HZ, replay_source
+from host.live.replay import replay_source
 from host.live.udp_place import udp_place
 from host.physical.calibration import Calibration
 from host.planning.wanted_widths import wanted_widths
@@ -42,7 +42,7 @@ class LiveRequest:
     output: Path | None = None
     baud: int | None = None
     calibration: Path | None = None
-    rate_hz: float = RADIO_RATE_HZ
+    rate_hz: float | None = None
     port: int | None = None
     lan: bool = False
     page: bool = True

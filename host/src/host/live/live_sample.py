@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from host.link.status_line import StatusLine
+from host.live.gps_fix import GpsFix
 
 Array = NDArray[np.float64]
 
@@ -68,6 +69,8 @@ class LiveUpdate:
     slow : list of SlowFrame
     arrived_s : float
         When the portion was read, on the clock of `time.time`.
+    fixes : list of GpsFix
+        New positions, on the clock of the rows.
     messages : list of str
         What a person should know.
     status : StatusLine or None
@@ -80,6 +83,7 @@ class LiveUpdate:
     slow: list[SlowFrame]
     arrived_s: float
     messages: list[str] = field(default_factory=list)
+    fixes: list[GpsFix] = field(default_factory=list)
     status: StatusLine | None = None
 
     def __len__(self) -> int:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from host.link.serial import LineSplitter
 from host.link.status_line import StatusLine, parse_status
+from host.live.gps_fix import GpsFix, fix_of_frame
 from host.live.height_over_start import HeightOverStart
 from host.live.live_sample import LIVE_UNITS, Array, LiveUpdate, SlowFrame
 from host.live.text_rows import TextRows
@@ -48,6 +49,8 @@ class LiveStream:
         Counts to SI.
     texts : collection of bytes
         Schemas known beside the released ones.
+    row_rate_hz : float, optional
+        Of rows of text that are played again; others are placed where they arrive.
 
     Attributes
     ----------
@@ -55,7 +58,12 @@ class LiveStream:
         Calls a consumer with an update; a session's own keeps a mistake in one from the others.
     """
 
-    def __init__(self, calibration: Calibration, texts: Collection[bytes] = ()) -> None:
+    def __init__(
+        self,
+        calibration: Calibration,
+        texts: Collection[bytes] = (),
+        row_rate_hz: float | None = None,
+    ) -> None:
         self.safely: Callable[[Consumer, LiveUpdate], None] = lambda one, update: one(update)
         self.calibration = calibration
         self.schema: Schema | None = None
@@ -68,7 +76,7 @@ class LiveStream:
         self._reader = EnvelopeReader()
         self._lines = LineSplitter()
         self._text_bytes = 0
-        self._text = TextRows(calibration)
+        self._text = TextRows(calibration, row_rate_hz)
         self._waiting: deque[bytes] = deque(maxlen=_WAITING)
         self._recent: dict[int, deque[bytes]] = {}
         self._consumers: list[Consumer] = []
@@ -85,6 +93,11 @@ class LiveStream:
     def damaged_bytes(self) -> int:
         """Bytes in no whole envelope and no text."""
         return 0 if self._text.rows else self._reader.skipped - self._text_bytes
+
+    @property
+    def text_variant(self) -> str:
+        """Which of the original logger's rows the stream holds; empty for frames."""
+        return self._text.variant
 
     @property
     def received(self) -> bool:
@@ -173,6 +186,7 @@ class LiveStream:
     ) -> LiveUpdate:
         schema = self.schema
         slow: list[SlowFrame] = []
+        fixes: list[GpsFix] = []
         idents: list[bytes] = []
         times: list[float] = []
         static_pa: list[float] = []
@@ -195,10 +209,12 @@ class LiveStream:
             else:
                 self._air(layout.name, row[0])
                 slow.append(SlowFrame(layout.name, row[0], t_s))
+                if layout.name == "gps" and schema is not None:
+                    fixes.append(fix_of_frame(schema, row[0], t_s))
         self.rows += len(idents)
         self.lost += lost
         rows, drives = self._rows(idents, times, static_pa)
-        return LiveUpdate(rows, drives, lost, slow, arrived_s, messages)
+        return LiveUpdate(rows, drives, lost, slow, arrived_s, messages, fixes)
 
     def _seconds(self, t_us: int) -> float:
         """Return a frame's time since the first one; a reset of the Mega does not turn it back."""

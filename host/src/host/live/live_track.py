@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from host.constants import RAD_PER_DEG
-from host.wire.schema import Schema
+from host.live.gps_fix import GpsFix
 
 _EARTH_M = 6_371_000.0
 _LEAST_SPEED_MPS = 8.0  # below it the airspeed says nothing
@@ -36,17 +35,11 @@ class LiveTrack:
         self.home: tuple[float, float, float] | None = None
         self.made = 0
 
-    def add(self, schema: Schema, row: Any, airspeed_mps: float, theta: float, psi: float) -> None:
-        """Take a frame `gps` with airspeed (m/s), pitch and heading (rad) of its instant."""
-        fixes = (schema.number("gps_fix", "fix_2d"), schema.number("gps_fix", "fix_3d"))
-        if int(row["fix"]) not in fixes:
+    def add(self, fix: GpsFix, airspeed_mps: float, theta: float, psi: float) -> None:
+        """Take a position with airspeed (m/s), pitch and heading (rad) of its instant."""
+        place = fix.place
+        if place is None:
             return
-        frame = schema.by_name["gps"]
-        value = {
-            name: float(row[name]) * frame.field(name).scale
-            for name in ("latitude", "longitude", "height", "v_north", "v_east")
-        }
-        place = value["latitude"], value["longitude"], value["height"]
         if self.home is None:
             self.home = place
         east, north = local_m(place, self.home)
@@ -55,7 +48,7 @@ class LiveTrack:
         self.made += 1
         if len(self.points) > _KEPT:
             del self.points[: _KEPT // 2 : 2], self.places[: _KEPT // 2 : 2]
-        self._wind(value["v_east"], value["v_north"], airspeed_mps, theta, psi)
+        self._wind(fix.velocity_mps[1], fix.velocity_mps[0], airspeed_mps, theta, psi)
 
     def _wind(self, east: float, north: float, speed: float, theta: float, psi: float) -> None:
         flies = speed > _LEAST_SPEED_MPS and math.hypot(east, north) > _LEAST_GROUND_MPS

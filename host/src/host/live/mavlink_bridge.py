@@ -15,7 +15,8 @@ from typing import Any
 from host.constants import RAD_PER_DEG
 from host.errors import UsageError
 from host.extras import install_hint
-from host.live.live_sample import LiveUpdate, SlowFrame
+from host.live.gps_fix import GpsFix
+from host.live.live_sample import LiveUpdate
 from host.live.live_session import LiveSession
 from host.live.mavlink_parameters import calibration_parameters
 from host.live.udp_place import udp_address
@@ -97,9 +98,8 @@ class MavlinkBridge:
             if now_s - self._fast_s >= _FAST_S:
                 self._fast_s = now_s
                 self._say_row()
-        for frame in update.slow:
-            if frame.name == "gps":
-                self._say_gps(frame)
+        for fix in update.fixes:
+            self._say_gps(fix)
 
     def _send(self, name: str, *values: Any) -> None:
         message = getattr(self._link, f"{name}_encode")(*values)
@@ -131,28 +131,21 @@ class MavlinkBridge:
         height = _or_zero(row["altitude_m"])
         self._send("vfr_hud", speed, ground, heading, throttle, height, 0.0)
 
-    def _say_gps(self, frame: SlowFrame) -> None:
-        schema, row = self._session.stream.schema, frame.row
-        if schema is None:
-            return
-        fix = _FIXES.get(schema.word("gps_fix", int(row["fix"])), 0)
-        latitude, longitude = int(row["latitude"]), int(row["longitude"])
-        height_mm = int(row["height"])
-        if fix < 2:
-            latitude = longitude = height_mm = 0
+    def _say_gps(self, fix: GpsFix) -> None:
+        place = fix.place or (0.0, 0.0, 0.0)
+        latitude, longitude = round(place[0] * 1e7), round(place[1] * 1e7)
+        height_mm = round(place[2] * 1e3)
         boot_ms = self._boot_ms()
-        course = int(row["course"])
+        over_ground = _hundredths(fix.ground_speed_mps), _hundredths(fix.course_deg)
         self._send(
-            "gps_raw_int", boot_ms * 1000, fix, latitude, longitude, height_mm, _UNKNOWN_U16,
-            _UNKNOWN_U16, int(row["ground_speed"]), course, int(row["satellites"]),
+            "gps_raw_int", boot_ms * 1000, _FIXES.get(fix.word, 0), latitude, longitude, height_mm,
+            _UNKNOWN_U16, _UNKNOWN_U16, *over_ground, fix.satellites,
         )  # fmt: skip
-        if fix < 2:
+        if fix.place is None:
             return
         track = self._session.state.track.points
         relative_mm = round(track[-1][2] * 1e3) if track else 0
-        velocity = [
-            max(-32768, min(32767, int(row[f"v_{one}"]))) for one in ("north", "east", "down")
-        ]
+        velocity = [max(-32768, min(32767, round(one * 100.0))) for one in fix.velocity_mps]
         psi = self._row.get("psi_deg", math.nan)
         heading = round(psi * 100.0) % 36000 if math.isfinite(psi) else _UNKNOWN_U16
         self._send("global_position_int", boot_ms, latitude, longitude, height_mm, relative_mm,
@@ -266,6 +259,10 @@ class MavlinkBridge:
 def _mean(row: dict[str, float], *names: str) -> float:
     known = [row[name] for name in names if math.isfinite(row.get(name, math.nan))]
     return sum(known) / len(known) if known else math.nan
+
+
+def _hundredths(value: float) -> int:
+    return max(0, min(_UNKNOWN_U16, round(value * 100.0)))
 
 
 def _or_zero(value: float) -> float:

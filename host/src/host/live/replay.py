@@ -15,7 +15,8 @@ from host.errors import NotALogError, UsageError
 from host.files.regular import regular_file
 from host.live.live_sources import SPEED, Tell
 from host.log import FlightLog, read_log
-from host.original.rows import looks_like_rows
+from host.original.row_rate import RowRate, row_rate
+from host.original.rows import OriginalRows, looks_like_rows, read_rows
 from host.physical.calibration import load_calibration
 from host.wire.framing import SCHEMA_HASH_ID, envelope
 from host.wire.stream import Stream
@@ -25,7 +26,7 @@ _HASH_S = 5.0
 _WAIT_S = 0.02
 _CHUNK_S = 2.0  # of flight made into envelopes at a time
 _AT_ONCE = 1 << 16  # bytes of a portion where nothing waits
-_TEXT_BYTES_PER_S = 5 * 269.0  # rows of text carry no time: five a second of the thesis's length
+_NOMINAL_HZ = {"27 readings": 10.0, "23 readings": 10.0, "26 readings": 20.0}  # thesis 4.3, 5.2
 _HEAD = 4096
 # Least time between two frames of a kind on the radio, s (firmware/app/telemetry.cpp).
 _LEAST_S = {"mag": 0.484 * 1.024, "attitude": 0.191 * 1.024, "baro": 0.191 * 1.024}
@@ -40,15 +41,17 @@ class ReplaySource:
     path : Path
     speed : float
         Flight seconds per second; infinite as fast as it is decoded.
-    rate_hz : float
-        Identification frames a second of a log of the card; a capture is played as received.
+    rate_hz : float, optional
+        Identification frames a second of a log of the card, the radio's without it; a capture is
+        played as received. Of rows of text as they were printed; without it GPS tells.
     """
 
     path: Path
     speed: float = 1.0
-    rate_hz: float = RADIO_RATE_HZ
+    rate_hz: float | None = None
     baud: int = 0
     recorded: bool = True
+    _rows: tuple[OriginalRows, RowRate] | None = None
 
     @property
     def name(self) -> str:
@@ -59,7 +62,11 @@ class ReplaySource:
 
     def portions(self, tell: Tell) -> Iterator[bytes]:
         """Yield what the radio would have sent; ends with the recording."""
-        parts = self._text() if self._is_text() else self._parts(read_log(self.path))
+        if (rows := self._text_rows()) is not None:
+            tell(f"{self.path}: {_rate_words(*rows)}")
+            parts = self._text(rows[0])
+        else:
+            parts = self._parts(read_log(self.path))
         start_s = yielded_s = time.monotonic()
         gathered = bytearray()
         for at_s, data in parts:
@@ -78,15 +85,27 @@ class ReplaySource:
         yield bytes(gathered)
         tell(f"end of {self.path}")
 
-    def _is_text(self) -> bool:
-        with self.path.open("rb") as file:
-            return looks_like_rows(file.read(_HEAD))
+    @property
+    def row_rate_hz(self) -> float | None:
+        """Rows of text a second; None for frames, which carry their time."""
+        rows = self._text_rows()
+        return None if rows is None else _played_hz(*rows)
 
-    def _text(self) -> Iterator[tuple[float, bytes]]:
-        data = self.path.read_bytes()
-        step = 64
-        for at in range(0, len(data), step):
-            yield (at + step) / _TEXT_BYTES_PER_S, data[at : at + step]
+    def _text_rows(self) -> tuple[OriginalRows, RowRate] | None:
+        if self._rows is None:
+            with self.path.open("rb") as file:
+                text = looks_like_rows(file.read(_HEAD))
+            if text:
+                rows = read_rows(self.path)
+                self._rows = rows, row_rate(rows, self.rate_hz)
+        return self._rows
+
+    def _text(self, rows: OriginalRows) -> Iterator[tuple[float, bytes]]:
+        data, rate_hz = self.path.read_bytes(), self.row_rate_hz or 1.0
+        begin = 0
+        for number, end in enumerate([*rows.offset[1:].tolist(), len(data)]):
+            yield number / rate_hz, data[begin:end]
+            begin = end
 
     def _parts(self, log: FlightLog) -> Iterator[tuple[float, bytes]]:
         return self._timed(log) if log.stream is None else _as_received(log.stream)
@@ -133,7 +152,7 @@ class ReplaySource:
 
     def _least_s(self, name: str) -> float:
         if name == "ident":
-            return 0.9 / self.rate_hz
+            return 0.9 / (self.rate_hz or RADIO_RATE_HZ)
         return _LEAST_S.get(name, 0.0)
 
 
@@ -151,7 +170,21 @@ def _as_received(stream: Stream) -> Iterator[tuple[float, bytes]]:
         begin = end
 
 
-def replay_source(text: str, rate_hz: float) -> ReplaySource:
+def _played_hz(rows: OriginalRows, rate: RowRate) -> float:
+    """Return the rate of rows, or that of the thesis's flights where they do not tell it."""
+    return rate.rate_hz if rate.known else _NOMINAL_HZ[rows.variant]
+
+
+def _rate_words(rows: OriginalRows, rate: RowRate) -> str:
+    if rate.known:
+        return f"{len(rows)} rows at {rate.text}"
+    return (
+        f"{len(rows)} rows without a time, and GPS saw no way to tell it from: played at"
+        f" {_NOMINAL_HZ[rows.variant]:g} a second, as the thesis flew; --rate if it was another"
+    )
+
+
+def replay_source(text: str, rate_hz: float | None = None) -> ReplaySource:
     """Return the source of ``FILE`` or ``FILE@10x``; raises UsageError or NotALogError."""
     speed = 1.0
     found = SPEED.fullmatch(text)
@@ -162,7 +195,7 @@ def replay_source(text: str, rate_hz: float) -> ReplaySource:
         raise UsageError(f"{text}: a speed of {speed:g}, expected more than 0, such as @10x")
     path = regular_file(Path(text))
     source = ReplaySource(path, speed, rate_hz)
-    if not source._is_text():
+    if source.row_rate_hz is None:
         log = read_log(path, calibration=load_calibration(), limit_bytes=_HEAD * 64)
         if not len(log.blocks):
             raise NotALogError(f"{path}: nothing in it to play")

@@ -51,8 +51,10 @@ def add_parser(subparsers: Any) -> None:
                         " Cm_q=15,Cn_r=25 (default 10)")  # fmt: skip
     parser.add_argument("--baud", type=_whole, metavar="N",
                         help="baud rate (default: radio 57600, a Mega's USB 115200)")  # fmt: skip
-    parser.add_argument("--rate", type=_rate, default=20.0, metavar="HZ",
-                        help="most rows a second of a replay (default 20: a radio's)")  # fmt: skip
+    parser.add_argument("--rate", type=_rate, metavar="HZ",
+                        help="rows a second of a replay: of a log at most (default 20: a radio's),"
+                        " of the original logger's rows as they were printed (default: GPS tells"
+                        " it)")  # fmt: skip
     parser.add_argument("--port", type=_whole, metavar="N",
                         help="TCP port of the page (default: first free from 8050)")  # fmt: skip
     parser.add_argument("--lan", action="store_true",

@@ -17,6 +17,7 @@ import pandas as pd
 
 from host.aircraft.airframe import DOWN, NORTH, Array
 from host.constants import GRAVITY_MPS2, RAD_PER_DEG
+from host.original.printed_pulses import RANGE_US, printed_of_servo, servo_of_stick_us
 from host.twin.flight.fly import STEP_S, FlightRecord
 from host.twin.sensors.analog import analog, convert
 from host.twin.sensors.imu import imu
@@ -26,8 +27,6 @@ from host.twin.sensors.ubx import EARTH_RADIUS_M, POSITION_NOISE_M, VELOCITY_NOI
 IMU_RATE_HZ = 50.0
 GYRO_COUNTS_PER_DEGPS = 16.4
 GRAVITY_COUNTS = 8192.0
-MINIMUM_US = (1100, 1152, 1124, 1100)  # aileron, elevator, rudder, throttle
-MAXIMUM_US = (1956, 1904, 1904, 1960)
 # Times of the readings inside one turn of the loop, seconds after its start (27 ms of text follow).
 VANE_AT_S = 0.004
 PRESSURE_AT_S = 0.006
@@ -44,12 +43,6 @@ def row_times(record: FlightRecord) -> Array:
     steps = period * (1.0 + 0.03 * rng.standard_normal(count))
     at = 0.1 + np.cumsum(np.maximum(steps, 0.5 * period))
     return np.asarray(at[at < record.t_s[-1] - 0.05])
-
-
-def _map_us(pulse_us: Array, channel: int) -> Array:
-    """Arduino's map() to 1000..2000 in integers."""
-    low, high = MINIMUM_US[channel], MAXIMUM_US[channel]
-    return np.trunc((np.trunc(pulse_us) - low) * 1000 / (high - low)) + 1000
 
 
 def overflowed_vane(count: Array) -> Array:
@@ -101,7 +94,10 @@ def rows(record: FlightRecord, data: AirData) -> pd.DataFrame:
     pulses = record.pulses_us[
         np.maximum(np.searchsorted(record.pulse_starts_s + 0.012, at, side="right") - 1, 0)
     ]
-    aileron, elevator, rudder, throttle = (_map_us(pulses[:, k], k) for k in range(4))
+    surfaces = {
+        name: printed_of_servo(servo_of_stick_us(pulses[:, k], name), name)
+        for k, name in enumerate(RANGE_US)
+    }
     return pd.DataFrame(
         {
             "t_s": at + 0.03,
@@ -122,12 +118,10 @@ def rows(record: FlightRecord, data: AirData) -> pd.DataFrame:
             "AN4": np.round(raw_force[first, 1], 2),
             "AN5": np.round(raw_force[second, 2], 2),
             **_gps(record, at),
-            "elevs": np.round(0.0756 * elevator - 108.72, 2),
-            "ails": np.round(0.0738 * aileron - 112.29, 2),
-            "rdrs": np.round(
-                np.where(rudder < 1348, 0.0555 * rudder - 73.335, 0.0333 * rudder - 45.434), 2
-            ),
-            "throts": throttle - 1009,
+            "elevs": np.round(surfaces["elevator"], 2),
+            "ails": np.round(surfaces["aileron"], 2),
+            "rdrs": np.round(surfaces["rudder"], 2),
+            "throts": surfaces["throttle"],
         }
     )
 
