@@ -17,11 +17,12 @@ from host.sysid.models.diagnostics import reference_values
 from host.sysid.models.parameter_units import parameter_unit
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from host.sysid.answer.marks import Verdict
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
     from host.sysid.linear.linear_answer import Answer
+    from host.sysid.models.diagnostics import SignalFit
 
 
 def model_lines(answer: Answer, verdict: Verdict) -> list[str]:
@@ -73,19 +74,16 @@ def model_lines(answer: Answer, verdict: Verdict) -> list[str]:
             for c in answer.coefficients
         ]
     lines += [*constant_lines(answer), *history_lines(answer), *mode_lines(linear_modes(answer))]
-    for kind, fits in (
-        ("free simulation, fitted data", answer.fits),
-        ("free simulation, held-out data", answer.validation),
-    ):
-        if fits:
-            shares = ", ".join(
-                f"{f.name} {100.0 * f.nrmse:.1f} %"
-                if math.isfinite(f.nrmse)
-                else f"{f.name} diverges"
-                for f in fits
-            )
-            lines.append(f"  NRMSE ({kind}): {shares}")
+    lines += _fit_line("fitted data", answer.fits) + _fit_line("held-out data", answer.validation)
     return lines
+
+
+def _fit_line(kind: str, fits: Sequence[SignalFit]) -> list[str]:
+    shares = (
+        f"{f.name} {100.0 * f.nrmse:.1f} %" if math.isfinite(f.nrmse) else f"{f.name} diverges"
+        for f in fits
+    )
+    return [f"  NRMSE (free simulation, {kind}): {', '.join(shares)}"] if fits else []
 
 
 def _word(marks: Mapping[str, str], name: str) -> str:

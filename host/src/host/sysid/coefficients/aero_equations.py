@@ -127,36 +127,17 @@ def equations(
         s, history = {name: values[inside] for name, values in s.items()}, history.at(inside)
         u, v, w, *rates = (x[inside] for x in (u, v, w, *rates))
     mass = airframe.mass_kg * (1.0 + e["mass_share"])
-    ixx = airframe.ixx_kgm2 * (1.0 + e["ixx_share"])
-    iyy = airframe.iyy_kgm2 * (1.0 + e["iyy_share"])
-    izz = airframe.izz_kgm2 * (1.0 + e["izz_share"])
-    ixz = airframe.ixz_kgm2
     S, b, c = airframe.wing_area_m2, airframe.span_m, airframe.chord_m
     by_speed, by_density = history.thrust_slopes
     thrust = history.thrust_n + by_speed * (s["V"] * np.cos(s["alpha"]) - history.axial_mps)
     thrust = (thrust + by_density * e["density_share"]) * (1.0 + e["thrust_share"])
-    axis, hub = powerplant.axis, powerplant.hub_m
-    tx, tz = thrust * axis[0], thrust * axis[2]
-    spin = powerplant.rotor_kgm2 * history.spin_radps
-    hx, hz = spin * axis[0], spin * axis[2]
+    tx, tz = thrust * powerplant.axis[0], thrust * powerplant.axis[2]
     p, q, r, V = s["p"], s["q"], s["r"], s["V"]
     # Aerodynamic force from specific force, thrust subtracted (EQUATIONS.md, eq. 1).
     X, Y, Z = mass * s["ax"] - tx, mass * s["ay"], mass * s["az"] - tz
+    roll, pitch, yaw = _moments(s, e, history, airframe, powerplant, (mass, tx, tz))
     force = s["qbar"] * S
     ca, sa = np.cos(s["alpha"]), np.sin(s["alpha"])
-    arm_x, arm_z = hub[0] - e["cg_x_m"], hub[2] - e["cg_z_m"]
-    # Aerodynamic moments from Euler's equations with the rotor's angular momentum (EQUATIONS.md,
-    # eq. 2).
-    roll = ixx * s["pd"] - ixz * (s["rd"] + p * q) + (izz - iyy) * q * r + q * hz
-    roll += history.drive_nm * axis[0]
-    pitch = iyy * s["qd"] + (ixx - izz) * p * r + ixz * (p * p - r * r) + r * hx - p * hz
-    pitch -= arm_z * tx - arm_x * tz
-    yaw = izz * s["rd"] - ixz * (s["pd"] - q * r) + (iyy - ixx) * p * q - q * hx
-    yaw += history.drive_nm * axis[2]
-    # Moments about the plane of symmetry, where neither lift nor drag rolls or yaws: a CG 8 mm
-    # beside it makes Cl_alpha -0.024, which left out biased Cl_r by 4 %.
-    roll += e["cg_y_m"] * mass * s["az"]
-    yaw -= e["cg_y_m"] * mass * s["ax"]
     # From body to wind axes (EQUATIONS.md, eq. 5).
     lift, drag = -(Z * ca - X * sa) / force, -(X * ca + Z * sa) / force
     signals = {
@@ -185,6 +166,42 @@ def equations(
         "w": Equation(rates[2] - (s["az"] + gz + q * u - p * v), {}),
     }
     return Equations(found, lift, drag, along)
+
+
+def _moments(
+    s: Mapping[str, Array],
+    e: Mapping[str, float],
+    history: FlightHistory,
+    airframe: AirframeData,
+    powerplant: Powerplant,
+    mass_and_thrust: tuple[float, Array, Array],
+) -> tuple[Array, Array, Array]:
+    """Return the aerodynamic moments in roll, pitch, yaw (N m) by Euler's equations.
+
+    The rotor's angular momentum counts (EQUATIONS.md, eq. 2); the last argument is the mass and the
+    thrust along x and z.
+    """
+    mass, tx, tz = mass_and_thrust
+    ixx = airframe.ixx_kgm2 * (1.0 + e["ixx_share"])
+    iyy = airframe.iyy_kgm2 * (1.0 + e["iyy_share"])
+    izz = airframe.izz_kgm2 * (1.0 + e["izz_share"])
+    ixz = airframe.ixz_kgm2
+    axis, hub = powerplant.axis, powerplant.hub_m
+    spin = powerplant.rotor_kgm2 * history.spin_radps
+    hx, hz = spin * axis[0], spin * axis[2]
+    p, q, r = s["p"], s["q"], s["r"]
+    arm_x, arm_z = hub[0] - e["cg_x_m"], hub[2] - e["cg_z_m"]
+    roll = ixx * s["pd"] - ixz * (s["rd"] + p * q) + (izz - iyy) * q * r + q * hz
+    roll += history.drive_nm * axis[0]
+    pitch = iyy * s["qd"] + (ixx - izz) * p * r + ixz * (p * p - r * r) + r * hx - p * hz
+    pitch -= arm_z * tx - arm_x * tz
+    yaw = izz * s["rd"] - ixz * (s["pd"] - q * r) + (iyy - ixx) * p * q - q * hx
+    yaw += history.drive_nm * axis[2]
+    # About the plane of symmetry, where neither lift nor drag rolls or yaws: a CG 8 mm beside it
+    # makes Cl_alpha -0.024, which left out biased Cl_r by 4 %.
+    roll += e["cg_y_m"] * mass * s["az"]
+    yaw -= e["cg_y_m"] * mass * s["ax"]
+    return roll, pitch, yaw
 
 
 def body_velocity(s: Mapping[str, Array]) -> tuple[Array, Array, Array]:

@@ -93,53 +93,22 @@ def simulate_noise_free(
     """
     V, qbar, alpha_0 = condition
     a, n, jw = airframe, record.samples, record.jw
-    S, b, c = a.wing_area_m2, a.span_m, a.chord_m
-    lift = qbar * S / (a.mass_kg * V)
-    pitch, hat_q, hat_p = qbar * S * c / a.iyy_kgm2, 0.5 * c / V, 0.5 * b / V
-    high_pass = jw / (
-        jw + ATTITUDE_CROSSOVER_RADPS
-    )  # slow trim changes are outside the linear model
+    # Slow trim changes are outside the linear model.
+    high_pass = jw / (jw + ATTITUDE_CROSSOVER_RADPS)
     de, da, dr = (record.filtered(s[k], high_pass) for k in ("de", "da", "dr"))
-    # Short period and lateral motion in wind and body axes (Etkin & Reid, ch. 4).
     short_period = np.column_stack([s["alpha"] - alpha_0, s["q"]])
     if whole[0]:
-        short_period = _simulate(
-            np.array(
-                [
-                    [-lift * value("CL_alpha"), 1.0 - lift * value("CL_q") * hat_q],
-                    [pitch * value("Cm_alpha"), pitch * value("Cm_q") * hat_q],
-                ]
-            ),
-            np.array([[-lift * value("CL_de")], [pitch * value("Cm_de")]]),
-            de[:, None],
-            record.dt_s,
-        )
-    scale = {"beta": 1.0, "p": hat_p, "r": hat_p}
-    inertia = np.array([[a.ixx_kgm2, -a.ixz_kgm2], [-a.ixz_kgm2, a.izz_kgm2]])
-    A, B = np.zeros((4, 4)), np.zeros((4, 2))
-    for j, k in enumerate(scale):
-        A[0, j] = lift * value(f"CY_{k}") * scale[k]
-        moments = qbar * S * b * np.array([value(f"Cl_{k}"), value(f"Cn_{k}")]) * scale[k]
-        A[1:3, j] = np.linalg.solve(inertia, moments)
-    A[0, 1:4] += [np.sin(alpha_0), -np.cos(alpha_0), GRAVITY_MPS2 / V]
-    A[3, 1:4] = 1.0, np.tan(alpha_0), -LEVELLING_PERS
-    for j, k in enumerate(("da", "dr")):
-        B[0, j] = lift * value(f"CY_{k}")
-        moments = qbar * S * b * np.array([value(f"Cl_{k}"), value(f"Cn_{k}")])
-        B[1:3, j] = np.linalg.solve(inertia, moments)
+        short_period = _simulate(*_short_period(value, a, V, qbar), de[:, None], record.dt_s)
     beta, p, r, phi = s["beta"], s["p"], s["r"], history.phi_rad
     if whole[1]:
-        beta, p, r, phi = _simulate(A, B, np.column_stack([da, dr]), record.dt_s).T
+        system = _lateral_motion(value, a, condition)
+        beta, p, r, phi = _simulate(*system, np.column_stack([da, dr]), record.dt_s).T
     alpha, q = alpha_0 + short_period[:, 0], short_period[:, 1]
-    CL = a.mass_kg * GRAVITY_MPS2 / (qbar * S) + value("CL_de") * de
-    CL = CL + value("CL_alpha") * short_period[:, 0] + value("CL_q") * q * hat_q
-    CD = MEAN_DRAG + value("CD_alpha") * short_period[:, 0] + value("CD_de") * de
-    CY = value("CY_beta") * beta + (value("CY_p") * p + value("CY_r") * r) * hat_p
-    CY = CY + value("CY_da") * da + value("CY_dr") * dr
+    angles = {"alpha": short_period[:, 0], "beta": beta, "p": p, "q": q, "r": r}
     thrust = float(np.mean(history.thrust_n))
-    unit = qbar * S / a.mass_kg
-    ax = unit * (CL * np.sin(alpha) - CD * np.cos(alpha)) + thrust / a.mass_kg
-    az = -unit * (CL * np.cos(alpha) + CD * np.sin(alpha))
+    ax, ay, az = _specific_force(
+        value, a, condition, thrust, angles | {"de": de, "da": da, "dr": dr}
+    )
     pd, qd, rd = (record.rate(x) for x in (p, q, r))
     # Accelerometers beside the CG feel the angular acceleration times their arm.
     x, y, z = sensors.imu_m
@@ -149,7 +118,7 @@ def simulate_noise_free(
     theta = alpha_0 + record.filtered(q, 1.0 / (jw + ATTITUDE_CROSSOVER_RADPS))
     columns = {
         "ax_mps2": ax + qd * z - rd * y,
-        "ay_mps2": unit * CY + rd * x - pd * z,
+        "ay_mps2": ay + rd * x - pd * z,
         "az_mps2": az + pd * y - qd * x,
         "p_radps": p, "q_radps": q, "r_radps": r,
         "alpha_rad": record.filtered(
@@ -172,3 +141,63 @@ def simulate_noise_free(
         history.thrust_slopes,
     )
     return Record(record.dt_s, columns), simulated
+
+
+def _specific_force(
+    value: Callable[[str], float],
+    a: AirframeData,
+    condition: tuple[float, float, float],
+    thrust_n: float,
+    s: Mapping[str, Array],
+) -> tuple[Array, Array, Array]:
+    """Return the specific force at the CG along x, y, z; alpha and surfaces are from the trim."""
+    V, qbar, alpha_0 = condition
+    hat_q, hat_p = 0.5 * a.chord_m / V, 0.5 * a.span_m / V
+    unit = qbar * a.wing_area_m2 / a.mass_kg
+    CL = GRAVITY_MPS2 / unit + value("CL_de") * s["de"]
+    CL = CL + value("CL_alpha") * s["alpha"] + value("CL_q") * s["q"] * hat_q
+    CD = MEAN_DRAG + value("CD_alpha") * s["alpha"] + value("CD_de") * s["de"]
+    CY = value("CY_beta") * s["beta"] + (value("CY_p") * s["p"] + value("CY_r") * s["r"]) * hat_p
+    CY = CY + value("CY_da") * s["da"] + value("CY_dr") * s["dr"]
+    alpha = alpha_0 + s["alpha"]
+    ax = unit * (CL * np.sin(alpha) - CD * np.cos(alpha)) + thrust_n / a.mass_kg
+    az = -unit * (CL * np.cos(alpha) + CD * np.sin(alpha))
+    return ax, unit * CY, az
+
+
+def _short_period(
+    value: Callable[[str], float], a: AirframeData, V: float, qbar: float
+) -> tuple[Array, Array]:
+    """Return A and B of alpha and q by the elevator (Etkin & Reid, ch. 4)."""
+    lift = qbar * a.wing_area_m2 / (a.mass_kg * V)
+    pitch, hat_q = qbar * a.wing_area_m2 * a.chord_m / a.iyy_kgm2, 0.5 * a.chord_m / V
+    A = np.array(
+        [
+            [-lift * value("CL_alpha"), 1.0 - lift * value("CL_q") * hat_q],
+            [pitch * value("Cm_alpha"), pitch * value("Cm_q") * hat_q],
+        ]
+    )
+    return A, np.array([[-lift * value("CL_de")], [pitch * value("Cm_de")]])
+
+
+def _lateral_motion(
+    value: Callable[[str], float], a: AirframeData, condition: tuple[float, float, float]
+) -> tuple[Array, Array]:
+    """Return A and B of beta, p, r, phi by aileron and rudder, body axes (Etkin & Reid, ch. 4)."""
+    V, qbar, alpha_0 = condition
+    S, b = a.wing_area_m2, a.span_m
+    lift, hat_p = qbar * S / (a.mass_kg * V), 0.5 * b / V
+    scale = {"beta": 1.0, "p": hat_p, "r": hat_p}
+    inertia = np.array([[a.ixx_kgm2, -a.ixz_kgm2], [-a.ixz_kgm2, a.izz_kgm2]])
+    A, B = np.zeros((4, 4)), np.zeros((4, 2))
+    for j, k in enumerate(scale):
+        A[0, j] = lift * value(f"CY_{k}") * scale[k]
+        moments = qbar * S * b * np.array([value(f"Cl_{k}"), value(f"Cn_{k}")]) * scale[k]
+        A[1:3, j] = np.linalg.solve(inertia, moments)
+    A[0, 1:4] += [np.sin(alpha_0), -np.cos(alpha_0), GRAVITY_MPS2 / V]
+    A[3, 1:4] = 1.0, np.tan(alpha_0), -LEVELLING_PERS
+    for j, k in enumerate(("da", "dr")):
+        B[0, j] = lift * value(f"CY_{k}")
+        moments = qbar * S * b * np.array([value(f"Cl_{k}"), value(f"Cn_{k}")])
+        B[1:3, j] = np.linalg.solve(inertia, moments)
+    return A, B

@@ -71,11 +71,48 @@ def fit_frequency_equation_error(
     limits_hz : tuple of float, optional
         Band, Hz; by default from the data.
     """
+    keys, X_rows, y_rows = _regressions(model, maneuvers, limits_hz)
+    count, per = len(model.parameters), len(set(keys))
+    used = np.flatnonzero(np.any([X.any(axis=0) for X in X_rows], axis=0))
+    X_rows = [block[:, used] for block in X_rows]
+    theta, information = _weighed_by_equation(keys, X_rows, y_rows)
+    covariance = covariance_from_information(information)
+    residuals = [y - X @ theta for X, y in zip(X_rows, y_rows, strict=True)]
+    stacked = tuple(
+        np.column_stack(residuals[k * per : (k + 1) * per]) for k in range(len(maneuvers))
+    )
+    fitted = tuple(
+        np.column_stack(y_rows[k * per : (k + 1) * per]) - stacked[k] for k in range(len(maneuvers))
+    )
+    freedom = float(sum(len(y) for y in y_rows) - len(used))
+    return FitResult(
+        method="frequency equation error",
+        model=model,
+        names=model.parameter_names[:count],
+        estimate=theta[:count],
+        covariance=covariance[:count, :count],
+        covariance_white=covariance[:count, :count],
+        degrees_of_freedom=np.full(count, max(freedom, 1.0)),
+        residuals=stacked,
+        fitted=fitted,
+        residual_kind="rate",
+        noise_covariance=np.atleast_2d(np.cov(np.vstack(stacked).T)),
+        iterations=ROUNDS,
+        converged=True,
+        details={"states": float(len(model.states))},
+    )
+
+
+def _regressions(
+    model: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    limits_hz: tuple[float, float] | None,
+) -> tuple[list[int], list[Array], list[Array]]:
+    """Return state, regressors and rate of each equation of each maneuver, real part above."""
     measured = model.measured_states()
     count = len(model.parameters)
     entries = model.entries("AB")
     fixed = np.hstack([model.A, model.B])
-    n = len(model.states)
     active = sorted(set(entries.row.tolist()))
     size = count + len(active) * len(maneuvers)  # and x(T) - x(0) per equation and maneuver
     X_rows: list[Array] = []
@@ -101,35 +138,7 @@ def fit_frequency_equation_error(
             X_rows.append(np.vstack([X.real, X.imag]))
             y_rows.append(np.concatenate([y.real, y.imag]))
             keys.append(row)
-    used = np.flatnonzero(np.any([X.any(axis=0) for X in X_rows], axis=0))
-    X_rows = [block[:, used] for block in X_rows]
-    theta, information = _weighed_by_equation(keys, X_rows, y_rows)
-    covariance = covariance_from_information(information)
-    residuals = [y - X @ theta for X, y in zip(X_rows, y_rows, strict=True)]
-    per = len(active)
-    stacked = tuple(
-        np.column_stack(residuals[k * per : (k + 1) * per]) for k in range(len(maneuvers))
-    )
-    fitted = tuple(
-        np.column_stack(y_rows[k * per : (k + 1) * per]) - stacked[k] for k in range(len(maneuvers))
-    )
-    freedom = float(sum(len(y) for y in y_rows) - len(used))
-    return FitResult(
-        method="frequency equation error",
-        model=model,
-        names=model.parameter_names[:count],
-        estimate=theta[:count],
-        covariance=covariance[:count, :count],
-        covariance_white=covariance[:count, :count],
-        degrees_of_freedom=np.full(count, max(freedom, 1.0)),
-        residuals=stacked,
-        fitted=fitted,
-        residual_kind="rate",
-        noise_covariance=np.atleast_2d(np.cov(np.vstack(stacked).T)),
-        iterations=ROUNDS,
-        converged=True,
-        details={"states": float(n)},
-    )
+    return keys, X_rows, y_rows
 
 
 def _weighed_by_equation(

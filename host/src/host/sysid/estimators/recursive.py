@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -166,46 +166,28 @@ def fit_recursive_fourier(
     every_s : float
         Time between estimates, s.
     """
-    measured = model.measured_states()
-    entries = model.entries("AB")
     count = len(model.parameters)
-    fixed = np.hstack([model.A, model.B])
     f = np.arange(limits_hz[0], limits_hz[1] + 1e-9, SPACING_HZ)
     if len(f) < 4:
         raise IdentificationError(f"band {limits_hz} Hz holds {len(f)} lines, at least 4 needed")
-    s = 2j * np.pi * f
-    previous = (np.zeros((count, count)), np.zeros(count))
     history: list[Array] = []
     history_s: list[float] = []
     begin_s = 0.0
-    normal, right = previous
+    past_normal, past_right = np.zeros((count, count)), np.zeros(count)
+    normal, right = past_normal, past_right
     whole: dict[int, list[tuple[Spectrum, Spectrum]]] = {}
     for maneuver in maneuvers:
-        last: dict[int, tuple[Spectrum, Spectrum]] = {}
         check_shapes(model, maneuver)
-        signals = np.hstack([maneuver.outputs[:, measured], maneuver.inputs])
-        signals = signals - signals[0]
-        time_s = maneuver.time_s
-        running = maneuver.dt_s * np.cumsum(
-            signals[:, None, :] * np.exp(-np.outer(time_s, s))[:, :, None], axis=0
-        )
-        hop = max(1, round(every_s / maneuver.dt_s))
-        for k in [*range(hop - 1, maneuver.samples - 1, hop), maneuver.samples - 1]:
-            z = running[k]
-            end = np.exp(-s * time_s[k])[:, None] * signals[k, : len(measured)]
-            normal, right = previous[0].copy(), previous[1].copy()
-            for row in sorted(set(entries.row.tolist())):
-                X = _regressors(entries, row, z, count)
-                y = s * z[:, row] + end[:, row] - z @ fixed[row]
-                last[row] = (X, y)
-                normal += (X.conj().T @ X).real
-                right += (X.conj().T @ y).real
+        last: dict[int, tuple[Spectrum, Spectrum]] = {}
+        for time_s, last in _running_regressions(model, maneuver, f, every_s):
+            normal = past_normal + sum((X.conj().T @ X).real for X, _ in last.values())
+            right = past_right + sum((X.conj().T @ y).real for X, y in last.values())
             try:
                 history.append(solve_normal_equations(normal, right))
             except IdentificationError:
                 continue  # before the first input there is nothing to estimate
-            history_s.append(begin_s + float(time_s[k]))
-        previous = (normal, right)
+            history_s.append(begin_s + time_s)
+        past_normal, past_right = normal, right
         begin_s += maneuver.samples * maneuver.dt_s
         for row, lines in last.items():
             whole.setdefault(row, []).append(lines)
@@ -227,6 +209,36 @@ def fit_recursive_fourier(
         equations,
     )
     return replace(result, covariance=covariance, covariance_white=covariance)
+
+
+def _running_regressions(
+    model: LinearModel, maneuver: Maneuver, f: Array, every_s: float
+) -> Iterator[tuple[float, dict[int, tuple[Spectrum, Spectrum]]]]:
+    """Yield times and, of each state's equation, regressors and rate transformed up to there."""
+    measured = model.measured_states()
+    entries = model.entries("AB")
+    fixed = np.hstack([model.A, model.B])
+    s = 2j * np.pi * f
+    signals = np.hstack([maneuver.outputs[:, measured], maneuver.inputs])
+    signals = signals - signals[0]
+    time_s = maneuver.time_s
+    running = maneuver.dt_s * np.cumsum(
+        signals[:, None, :] * np.exp(-np.outer(time_s, s))[:, :, None], axis=0
+    )
+    hop = max(1, round(every_s / maneuver.dt_s))
+    for k in [*range(hop - 1, maneuver.samples - 1, hop), maneuver.samples - 1]:
+        z = running[k]
+        end = np.exp(-s * time_s[k])[:, None] * signals[k, : len(measured)]
+        yield (
+            float(time_s[k]),
+            {
+                row: (
+                    _regressors(entries, row, z, len(model.parameters)),
+                    s * z[:, row] + end[:, row] - z @ fixed[row],
+                )
+                for row in sorted(set(entries.row.tolist()))
+            },
+        )
 
 
 def _regressors(entries: EntryTable, row: int, z: Spectrum, count: int) -> Spectrum:

@@ -31,7 +31,7 @@ q_radps = "q_radps"
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -74,16 +74,11 @@ def equations_from(document: Mapping[str, object], name: str = "model") -> Nonli
     IdentificationError
         If it is no model.
     """
-    unknown = sorted(set(document) - set(KEYS))
-    if unknown:
-        raise IdentificationError(
-            f"unknown key {in_a_line(', '.join(unknown))}; known are {', '.join(KEYS)}"
-        )
+    _refuse_unknown(document)
     inputs, columns = _inputs(document)
     texts = {key: _texts(document, key) for key in ("rates", "outputs", "definitions", "starts")}
-    states, outputs, defined, started = (
-        tuple(name for name, _ in texts[key])
-        for key in ("rates", "outputs", "definitions", "starts")
+    states, outputs, defined = (
+        tuple(name for name, _ in texts[key]) for key in ("rates", "outputs", "definitions")
     )
     parameters, own = _parameters(document)
     constants, tables = _numbers(document), _tables(document)
@@ -99,9 +94,6 @@ def equations_from(document: Mapping[str, object], name: str = "model") -> Nonli
             "a table": [name for name, _, _ in tables],
         }
     )
-    strangers = sorted({*started} - {*states})
-    if strangers:
-        raise IdentificationError(f"starts.{strangers[0]}: no state; there are {', '.join(states)}")
     equations = Equations(
         definitions=texts["definitions"],
         rates=texts["rates"],
@@ -114,13 +106,9 @@ def equations_from(document: Mapping[str, object], name: str = "model") -> Nonli
         controls=len(inputs),
     )
     initial = _constants(document, "initial_states", states, states)
-    _refuse_idle(equations, [name for _, name in initial.shared])
-    equations.text()  # what is too large with its slopes is refused now
-    equations.check_starts()
+    _check(equations, states, [name for _, name in initial.shared])
     zero = no_tangent(equations)
-    hold = str(document.get("hold", LINE))
-    if hold not in HOLDS:
-        raise IdentificationError(f"hold: {shown(hold)}, use {', '.join(HOLDS)}")
+    hold = _hold(document)
     return NonlinearModel(
         equations=equations,
         own_parameters=own,
@@ -146,6 +134,21 @@ def equations_from(document: Mapping[str, object], name: str = "model") -> Nonli
     )
 
 
+def _refuse_unknown(document: Mapping[str, object]) -> None:
+    unknown = sorted(set(document) - set(KEYS))
+    if unknown:
+        raise IdentificationError(
+            f"unknown key {in_a_line(', '.join(unknown))}; known are {', '.join(KEYS)}"
+        )
+
+
+def _hold(document: Mapping[str, object]) -> str:
+    hold = str(document.get("hold", LINE))
+    if hold not in HOLDS:
+        raise IdentificationError(f"hold: {shown(hold)}, use {', '.join(HOLDS)}")
+    return hold
+
+
 def _inputs(document: Mapping[str, object]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return what a pilot moves and what is measured; without either a motion is free."""
     inputs, columns = (
@@ -164,8 +167,11 @@ def _numbers(document: Mapping[str, object]) -> tuple[tuple[str, float], ...]:
     )
 
 
-def _refuse_idle(equations: Equations, starting: Collection[str]) -> None:
-    """Refuse a parameter that enters no expression, and is no initial state."""
+def _check(equations: Equations, states: Sequence[str], starting: Collection[str]) -> None:
+    """Refuse starts of no state, idle parameters, and equations too large with their slopes."""
+    strangers = sorted({name for name, _ in equations.starts} - {*states})
+    if strangers:
+        raise IdentificationError(f"starts.{strangers[0]}: no state; there are {', '.join(states)}")
     nodes = equations.nodes()
     used = {
         nodes.graph.nodes[k].name for k in nodes.graph.reachable([*nodes.rates, *nodes.outputs])
@@ -173,6 +179,8 @@ def _refuse_idle(equations: Equations, starting: Collection[str]) -> None:
     idle = [name for name in equations.parameters if name not in {*used, *starting}]
     if idle:
         raise IdentificationError(f"parameters.{idle[0]}: enters no expression")
+    equations.text()
+    equations.check_starts()
 
 
 def _texts(document: Mapping[str, object], key: str) -> tuple[tuple[str, str], ...]:

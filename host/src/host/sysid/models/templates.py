@@ -10,21 +10,15 @@ accelerometers a parameter with that prior deviation.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from host.constants import GRAVITY_MPS2
 from host.errors import IdentificationError
-from host.sysid.models.residual_delays import delays_of
-from host.sysid.models.state_space_model import (
-    AccelerometerOffset,
-    DelayGroup,
-    LinearModel,
-    Parameter,
-    Term,
-)
+from host.sysid.models.model_builder import ModelBuilder
+from host.sysid.models.state_space_model import DelayGroup, LinearModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,94 +44,6 @@ class Trim:
         return bool(np.isfinite(self.airspeed_mps))
 
 
-@dataclass(slots=True)
-class _Builder:
-    """Collector of the entries of a model by signal names."""
-
-    name: str
-    states: tuple[str, ...]
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    parameters: dict[str, Parameter] = field(default_factory=dict)
-    terms: list[Term] = field(default_factory=list)
-    known: dict[tuple[str, str, str], float] = field(default_factory=dict)
-    accelerometer_offsets: list[AccelerometerOffset] = field(default_factory=list)
-
-    def add(self, name: str, start: float, places: Iterable[tuple[str, str, float]]) -> None:
-        """Add a parameter to entries (row, column) with gains; unknown signals are left out."""
-        found = []
-        for row, column, gain in places:
-            place = self._place(row, column)
-            if place is not None and gain != 0.0:
-                found.append(Term(*place, name, gain))
-        if found:
-            self.parameters[name] = Parameter(name, start)
-            self.terms += found
-
-    def fix(self, row: str, column: str, value: float) -> None:
-        """Set a known entry."""
-        if self._place(row, column) is not None:
-            kind = "rate" if row.endswith("'") else "output"
-            self.known[kind, row.rstrip("'"), column] = value
-
-    def _place(self, row: str, column: str) -> tuple[str, int, int] | None:
-        rate = row.endswith("'")
-        rows = self.states if rate else self.outputs
-        label = row.rstrip("'")
-        if label not in rows:
-            return None
-        if column in self.states:
-            return "A" if rate else "C", rows.index(label), self.states.index(column)
-        if column in self.inputs:
-            return "B" if rate else "D", rows.index(label), self.inputs.index(column)
-        return None
-
-    def accelerometer_offset(
-        self, output: str, state: str, name: str, gain: float, sd_m: float
-    ) -> None:
-        """Add an accelerometer's offset from its assumed place, with a prior."""
-        if sd_m > 0.0 and output in self.outputs and state in self.states:
-            self.parameters[name] = Parameter(
-                name, 0.0, lower=-3.0 * sd_m, upper=3.0 * sd_m, prior_sd=sd_m
-            )
-            self.accelerometer_offsets.append(AccelerometerOffset(output, state, name, gain))
-
-    def build(self, *, delays: tuple[DelayGroup, ...], hold: str) -> LinearModel:
-        """Return the model; an output with the name of a state measures it."""
-        n, m, p = len(self.states), len(self.inputs), len(self.outputs)
-        matrices = {
-            "A": np.zeros((n, n)),
-            "B": np.zeros((n, m)),
-            "C": np.zeros((p, n)),
-            "D": np.zeros((p, m)),
-        }
-        for k, state in enumerate(self.states):
-            if state in self.outputs:
-                matrices["C"][self.outputs.index(state), k] = 1.0
-        for (kind, row, column), value in self.known.items():
-            place = self._place(row + ("'" if kind == "rate" else ""), column)
-            if place is not None:
-                matrices[place[0]][place[1], place[2]] = value
-        return LinearModel(
-            name=self.name,
-            states=self.states,
-            inputs=self.inputs,
-            outputs=self.outputs,
-            A=matrices["A"],
-            B=matrices["B"],
-            C=matrices["C"],
-            D=matrices["D"],
-            terms=tuple(self.terms),
-            parameters=tuple(self.parameters.values()),
-            state_biases=self.states,
-            output_biases=tuple(y for y in self.outputs if y not in self.states),
-            initial_states=self.states,
-            delays=delays_of(self.outputs, delays),
-            hold=hold,
-            accelerometer_offsets=tuple(self.accelerometer_offsets),
-        )
-
-
 def longitudinal(
     trim: Trim,
     *,
@@ -157,56 +63,36 @@ def longitudinal(
     gamma = trim.theta_rad - trim.alpha_rad
     outputs = ("airspeed_mps", "alpha_rad", "q_radps", "theta_rad")
     inputs = ("elevator_rad", "throttle") if throttle else ("elevator_rad",)
-    model = _Builder(
+    model = ModelBuilder(
         "longitudinal",
         outputs,
         inputs,
         (*outputs, "ax_mps2", "az_mps2") if accelerometers else outputs,
     )
     sine, cosine = float(np.sin(trim.alpha_rad)), float(np.cos(trim.alpha_rad))
-    if accelerometers:  # without a_z it is negligible beside the known q
-        model.add(
-            "Z_q",
-            -0.1,
-            [
-                ("alpha_rad'", "q_radps", 1.0),
-                ("ax_mps2", "q_radps", -V * sine),
-                ("az_mps2", "q_radps", V * cosine),
-            ],
-        )
-    for label, column, along, normal in (
-        ("V", "airspeed_mps", -0.1, -2.0 * g / V**2),
-        ("alpha", "alpha_rad", -5.0, -5.0),
-        ("de", "elevator_rad", 0.0, -0.5),
-        ("dt", "throttle", 3.0, 0.0),
-    ):
-        model.add(
-            f"D_{label}",
-            along,
-            [
-                ("airspeed_mps'", column, 1.0),
-                ("ax_mps2", column, cosine),
-                ("az_mps2", column, sine),
-            ],
-        )
-        if label != "dt":
-            model.add(
-                f"Z_{label}",
-                normal,
-                [
-                    ("alpha_rad'", column, 1.0),
-                    ("ax_mps2", column, -V * sine),
-                    ("az_mps2", column, V * cosine),
-                ],
-            )
-    for label, column, start in (
+    tangential = (("airspeed_mps'", 1.0), ("ax_mps2", cosine), ("az_mps2", sine))
+    normal = (("alpha_rad'", 1.0), ("ax_mps2", -V * sine), ("az_mps2", V * cosine))
+    forces = [
+        ("Z_q", "q_radps", -0.1, normal),
+        ("D_V", "airspeed_mps", -0.1, tangential),
+        ("Z_V", "airspeed_mps", -2.0 * g / V**2, normal),
+        ("D_alpha", "alpha_rad", -5.0, tangential),
+        ("Z_alpha", "alpha_rad", -5.0, normal),
+        ("D_de", "elevator_rad", 0.0, tangential),
+        ("Z_de", "elevator_rad", -0.5, normal),
+        ("D_dt", "throttle", 3.0, tangential),
+    ]
+    # Without a_z the lift by q is negligible beside the known q.
+    for name, column, start, rows in forces if accelerometers else forces[1:]:
+        model.add(name, start, [(row, column, gain) for row, gain in rows])
+    moments = (
         ("V", "airspeed_mps", 0.0),
         ("alpha", "alpha_rad", -50.0),
         ("q", "q_radps", -8.0),
         ("de", "elevator_rad", -60.0),
         ("dt", "throttle", 0.0),
-    ):
-        model.add(f"M_{label}", start, [("q_radps'", column, 1.0)])
+    )
+    model.add_row("M", "q_radps'", moments)
     model.fix("airspeed_mps'", "theta_rad", -g * float(np.cos(gamma)))
     model.fix("airspeed_mps'", "alpha_rad", g * float(np.cos(gamma)))
     model.fix("alpha_rad'", "q_radps", 1.0)
@@ -215,9 +101,9 @@ def longitudinal(
     model.fix("theta_rad'", "q_radps", 1.0)
     model.accelerometer_offset("ax_mps2", "q_radps", "imu_z_m", 1.0, imu_sd_m)
     model.accelerometer_offset("az_mps2", "q_radps", "imu_x_m", -1.0, imu_sd_m)
-    along, normal = g * float(np.sin(gamma)), -g * float(np.cos(gamma))  # of the trim
-    model.fix("ax_mps2", "alpha_rad", -(along * sine + normal * cosine))
-    model.fix("az_mps2", "alpha_rad", along * cosine - normal * sine)
+    f, n = g * float(np.sin(gamma)), -g * float(np.cos(gamma))  # of the trim
+    model.fix("ax_mps2", "alpha_rad", -(f * sine + n * cosine))
+    model.fix("az_mps2", "alpha_rad", f * cosine - n * sine)
     return model.build(delays=delays, hold=hold)
 
 
@@ -233,7 +119,7 @@ def short_period(
     V = trim.airspeed_mps
     cosine = float(np.cos(trim.alpha_rad))
     states = ("alpha_rad", "q_radps")
-    model = _Builder(
+    model = ModelBuilder(
         "short-period",
         states,
         ("elevator_rad",),
@@ -246,12 +132,12 @@ def short_period(
         model.add(
             f"Z_{label}", start, [("alpha_rad'", column, 1.0), ("az_mps2", column, V * cosine)]
         )
-    for label, column, start in (
+    moments = (
         ("alpha", "alpha_rad", -50.0),
         ("q", "q_radps", -8.0),
         ("de", "elevator_rad", -60.0),
-    ):
-        model.add(f"M_{label}", start, [("q_radps'", column, 1.0)])
+    )
+    model.add_row("M", "q_radps'", moments)
     model.fix("alpha_rad'", "q_radps", 1.0)
     model.fix("az_mps2", "alpha_rad", GRAVITY_MPS2 * float(np.sin(trim.alpha_rad)))
     model.accelerometer_offset("az_mps2", "q_radps", "imu_x_m", -1.0, imu_sd_m)
@@ -268,7 +154,7 @@ def phugoid(
 ) -> LinearModel:
     """Return the two-state phugoid model, alpha quasi-steady (EQUATIONS.md, eq. 7)."""
     del accelerometers, imu_sd_m  # in slow motion they measure only gravity
-    model = _Builder(
+    model = ModelBuilder(
         "phugoid",
         ("airspeed_mps", "theta_rad"),
         ("elevator_rad",),
@@ -294,27 +180,22 @@ def lateral(
 ) -> LinearModel:
     """Return the four-state lateral model (EQUATIONS.md, eq. 7)."""
     states = ("beta_rad", "p_radps", "r_radps", "phi_rad")
-    model = _Builder(
+    model = ModelBuilder(
         "lateral",
         states,
         ("aileron_rad", "rudder_rad") if rudder else ("aileron_rad",),
         (*states, "ay_mps2") if accelerometers else states,
     )
     _side_force(model, trim, with_rates=accelerometers)
-    columns = (
-        ("beta", "beta_rad"),
-        ("p", "p_radps"),
-        ("r", "r_radps"),
-        ("da", "aileron_rad"),
-        ("dr", "rudder_rad"),
+    moments = (
+        ("beta", "beta_rad", -30.0, 15.0),
+        ("p", "p_radps", -10.0, -1.0),
+        ("r", "r_radps", 3.0, -2.0),
+        ("da", "aileron_rad", 100.0, 0.0),
+        ("dr", "rudder_rad", 0.0, -20.0),
     )
-    starts = {
-        "L": (-30.0, -10.0, 3.0, 100.0, 0.0),
-        "N": (15.0, -1.0, -2.0, 0.0, -20.0),
-    }
-    for axis, row in (("L", "p_radps'"), ("N", "r_radps'")):
-        for (label, column), start in zip(columns, starts[axis], strict=True):
-            model.add(f"{axis}_{label}", start, [(row, column, 1.0)])
+    model.add_row("L", "p_radps'", [(label, column, start) for label, column, start, _ in moments])
+    model.add_row("N", "r_radps'", [(label, column, start) for label, column, _, start in moments])
     model.fix("phi_rad'", "p_radps", 1.0)
     model.fix("phi_rad'", "r_radps", float(np.tan(trim.theta_rad)))
     model.accelerometer_offset("ay_mps2", "p_radps", "imu_z_m", -1.0, imu_sd_m)
@@ -332,19 +213,15 @@ def dutch_roll(
 ) -> LinearModel:
     """Return the two-state dutch-roll model (wings held level)."""
     states = ("beta_rad", "r_radps")
-    model = _Builder(
+    model = ModelBuilder(
         "dutch-roll",
         states,
         ("rudder_rad",),
         (*states, "ay_mps2") if accelerometers else states,
     )
     _side_force(model, trim, with_rates=False)
-    for label, column, start in (
-        ("beta", "beta_rad", 15.0),
-        ("r", "r_radps", -2.0),
-        ("dr", "rudder_rad", -20.0),
-    ):
-        model.add(f"N_{label}", start, [("r_radps'", column, 1.0)])
+    moments = (("beta", "beta_rad", 15.0), ("r", "r_radps", -2.0), ("dr", "rudder_rad", -20.0))
+    model.add_row("N", "r_radps'", moments)
     model.accelerometer_offset("ay_mps2", "r_radps", "imu_x_m", 1.0, imu_sd_m)
     return model.build(delays=delays, hold=hold)
 
@@ -360,14 +237,14 @@ def roll(
     """Return the one-state roll model, bank angle measured beside the rate."""
     del trim, accelerometers, imu_sd_m
     states = ("p_radps", "phi_rad")
-    model = _Builder("roll", states, ("aileron_rad",), states)
+    model = ModelBuilder("roll", states, ("aileron_rad",), states)
     model.add("L_p", -10.0, [("p_radps'", "p_radps", 1.0)])
     model.add("L_da", 100.0, [("p_radps'", "aileron_rad", 1.0)])
     model.fix("phi_rad'", "p_radps", 1.0)
     return model.build(delays=delays, hold=hold)
 
 
-def _side_force(model: _Builder, trim: Trim, *, with_rates: bool) -> None:
+def _side_force(model: ModelBuilder, trim: Trim, *, with_rates: bool) -> None:
     V = trim.airspeed_mps
     terms = [("beta", "beta_rad", -0.5), ("da", "aileron_rad", 0.0), ("dr", "rudder_rad", 0.3)]
     if with_rates:  # without a_y they are negligible beside the known -cos(alpha) r
