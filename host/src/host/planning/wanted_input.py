@@ -8,8 +8,9 @@ import numpy as np
 
 from host.aircraft.airframe import Array
 from host.planning.aircraft_response import STEP_S, AircraftResponse
-from host.twin.testcard.cards import Segment, input_s, sine_inputs
+from host.twin.testcard.cards import Segment, input_s
 from host.twin.testcard.input_shapes import STEPS, staircase
+from host.twin.testcard.sine_inputs import sine_inputs
 
 SURFACES = ("elevator", "aileron", "rudder")
 RESPONSE_S = 3.0  # behind the input, as the finder's window

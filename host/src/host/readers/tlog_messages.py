@@ -24,24 +24,28 @@ from host.readers.autopilot_log import (
     NotAutopilotLogError,
     last_time_s,
 )
-from host.readers.clock_epochs import clock_sets, epoch_starts
+from host.readers.clock_epochs import epoch_starts
 from host.readers.mavlink_frames import Frames, frames_of
 from host.readers.mavlink_layout import Layout, layouts
 from host.readers.plausible_times import plausible_times
 from host.readers.px4_tailsitter import MAV_TYPES
+from host.readers.tlog_clock import (
+    BOTH_CLOCKS,
+    OTHER_CLOCK_S,
+    PLACE,
+    STAMP,
+    Fields,
+    Station,
+    message_times,
+    own_times,
+)
 from host.readers.ulog_messages import BY_MAV_TYPE
 from host.readers.written_parameters import Parameters
 
 AUTOPILOTS = {3: "ardupilot", 12: "px4"}
 GROUND_STATION, NO_AUTOPILOT = 6, 8
 REAL32 = 9  # MAV_PARAM_TYPE
-WRAP_US = float(1 << 32)
-OTHER_CLOCK_S = 1e9  # a time since boot is shorter than thirty years
 PORTION_BYTES = 8 << 20  # read at a time
-STAMP = "received_s"  # of the ground station, beside a message's own fields
-PLACE = "place"  # of a message's frame in the log
-BOTH_CLOCKS = "ATTITUDE"  # has both clocks, so it dates the autopilot's start
-Fields = dict[str, NDArray[Any]]
 
 
 @dataclass(slots=True)
@@ -113,7 +117,7 @@ def read_tlog(path: Path) -> list[AutopilotLog]:
     timed = [
         (fields[PLACE], own_s)
         for name, fields in tables.items()
-        if (own_s := _own_times(name, fields)) is not None
+        if (own_s := own_times(name, fields)) is not None
     ]
     starts = epoch_starts(timed)
     # A sender that starts again numbers its frames anew: what seems lost there was never sent.
@@ -131,7 +135,7 @@ def read_tlog(path: Path) -> list[AutopilotLog]:
         own_remarks = list(remarks)
         texts = _words(own.pop("STATUSTEXT", {}).get("text", ()))
         said = own.pop("PARAM_VALUE", {})
-        station = _Station(own, own_remarks)
+        station = Station(own, own_remarks)
         messages = _messages(own, station, own_damage)
         written.append((_parameters(said, station, autopilot), last_time_s(messages)))
         logs.append(
@@ -175,7 +179,7 @@ def _first_place(timed: Sequence[tuple[IntArray, Array]], start: int) -> int:
     return min((int(places[row]) for places, row in rows if row < len(places)), default=start)
 
 
-def _parameters(said: Fields, station: _Station, autopilot: int) -> list[tuple[str, float, float]]:
+def _parameters(said: Fields, station: Station, autopilot: int) -> list[tuple[str, float, float]]:
     """Return name, value and time of parameters as the autopilot said them.
 
     PX4 sends the bytes of an integer as those of a float, ArduPilot its value.
@@ -325,12 +329,12 @@ def _words(raw: Any) -> list[str]:
 
 
 def _messages(
-    tables: dict[str, Fields], station: _Station, damage: list[str]
+    tables: dict[str, Fields], station: Station, damage: list[str]
 ) -> dict[str, dict[int, Messages]]:
     found: dict[str, dict[int, Messages]] = {}
     for name in list(tables):
         fields = dict(tables.pop(name))
-        t_s = _times(name, fields, station)
+        t_s = message_times(name, fields, station)
         ports = fields.pop("port", None)
         for port in (0,) if ports is None else np.unique(ports).tolist():
             mine = slice(None) if ports is None or len(np.unique(ports)) == 1 else ports == port
@@ -356,55 +360,3 @@ def _increasing_rows(t_s: Array, kept: BoolArray) -> Any:
     if not len(rows):
         return None
     return rows[np.concatenate([[True], np.diff(t_s[rows]) > 0.0])]
-
-
-class _Station:
-    """The clock of the ground station, and the instants of it at which the autopilot's was 0.
-
-    There are several where the station's clock was set: from each place in the log on another.
-    """
-
-    def __init__(self, tables: Mapping[str, Fields], remarks: list[str]) -> None:
-        both = tables.get(BOTH_CLOCKS, {})
-        self._places: IntArray = np.zeros(0, dtype=np.int64)
-        if not len(both.get(STAMP, ())):
-            every = [fields[STAMP] for fields in tables.values() if len(fields.get(STAMP, ()))]
-            self._boots_s = np.array([min((float(s.min()) for s in every), default=0.0)])
-            return
-        started = both[STAMP] - both["time_boot_ms"] * 1e-3
-        sets = clock_sets(started)
-        self._boots_s = np.array([np.median(part) for part in np.split(started, sets)])
-        self._places = both[PLACE][sets].astype(np.int64)
-        for row, change_s in zip(sets.tolist(), np.diff(self._boots_s).tolist(), strict=True):
-            remarks.append(
-                f"the ground station's clock was set by {change_s:+.1f} s at"
-                f" {both['time_boot_ms'][row] * 1e-3:.1f} s: taken out of the messages that it"
-                " timed"
-            )
-
-    def since_boot_s(self, stamps: Array, places: IntArray) -> Array:
-        """Return times since boot of messages by their time of reception."""
-        return np.asarray(stamps - self._boots_s[np.searchsorted(self._places, places, "right")])
-
-
-def _own_times(name: str, fields: Fields) -> Array | None:
-    """Return times since boot of messages that say it themselves."""
-    if "time_boot_ms" in fields:
-        return np.asarray(fields["time_boot_ms"] * 1e-3, dtype=np.float64)
-    if STAMP in fields or "time_usec" not in fields:
-        return None
-    own_us = np.asarray(fields["time_usec"], dtype=np.float64)
-    if name == "SERVO_OUTPUT_RAW":  # 32 bits
-        own_us = np.unwrap(own_us, period=WRAP_US)
-    return own_us * 1e-6
-
-
-def _times(name: str, fields: Fields, station: _Station) -> Array:
-    """Return times since boot: a message's own where it has one."""
-    own_s = _own_times(name, fields)
-    places, stamps = fields.pop(PLACE), fields.pop(STAMP, None)
-    for stamp in ("time_boot_ms", "time_usec"):
-        fields.pop(stamp, None)
-    if own_s is not None:
-        return own_s
-    return station.since_boot_s(np.asarray(stamps, dtype=np.float64), places)

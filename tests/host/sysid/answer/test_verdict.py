@@ -11,7 +11,8 @@ from host.sysid.answer.marks import share_text
 from host.sysid.estimators import fit
 from host.sysid.linear import Answer
 from host.sysid.models import Trim
-from host.sysid.models.diagnostics import SignalFit, collinearity, reference_values
+from host.sysid.models.collinearity import collinearity
+from host.sysid.models.diagnostics import SignalFit, reference_values
 from host.sysid.models.modal_analysis import modes, modes_of
 from host.sysid.models.templates import TEMPLATES
 from studies.data import noisy

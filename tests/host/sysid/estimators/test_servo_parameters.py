@@ -14,10 +14,9 @@ from host.instrument.deviations import unknown_sensors
 from host.instrument.servo_prior import ServoPrior, servo_prior
 from host.physical.recording import Recording
 from host.sysid.estimators import fit
+from host.sysid.estimators.servo_delay_profile import CoarseDelays, DelayProfile
 from host.sysid.estimators.servo_parameters import (
-    CoarseDelays,
     ServoEstimate,
-    _Profile,
     _rival,
     considered_servo,
     estimate_servo,
@@ -194,7 +193,7 @@ def test_a_better_delay_far_away_is_named() -> None:
     def found(delay_s: float) -> float:
         return float(np.interp(delay_s, list(costs), list(costs.values())))
 
-    profile = _Profile(template("roll", Trim(17.0)), lambda _: [], WIDE, lambda *_: None)  # type: ignore[arg-type]
+    profile = DelayProfile(template("roll", Trim(17.0)), lambda _: [], WIDE, lambda *_: None)  # type: ignore[arg-type]
     for asked in costs:
         profile.costs[asked] = found(asked)
         profile.fits[asked] = None  # type: ignore[assignment]

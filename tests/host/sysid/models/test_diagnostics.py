@@ -10,13 +10,12 @@ from host.sysid.answer import answer_document
 from host.sysid.answer.estimate_lines import model_lines
 from host.sysid.linear import Answer
 from host.sysid.models import Parameter, Term, Trim, model_from
+from host.sysid.models.collinearity import collinearity, constant_inputs
 from host.sysid.models.diagnostics import (
     NOT_IDENTIFIABLE,
     WEAKLY_IDENTIFIABLE,
     assess_identifiability,
     bound_exceedance_probability,
-    collinearity,
-    constant_inputs,
     identifiability_flags,
     reference_values,
     signal_fits,

@@ -22,7 +22,7 @@ from host.sysid.estimators.regression import (
     regression_equations,
     solve_least_squares,
 )
-from host.sysid.models.diagnostics import CONDITION_LIMIT
+from host.sysid.models.collinearity import CONDITION_LIMIT
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, has_equations
 from host.sysid.numerics.output_error import Optimum, minimise

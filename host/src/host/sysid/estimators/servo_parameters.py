@@ -15,9 +15,8 @@ free delay drew the filter to 3.5 Hz on thor75, where 6 Hz and 50 ms were publis
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -25,32 +24,28 @@ from host.arrays import Array
 from host.constants import NORMAL_95
 from host.errors import IdentificationError
 from host.instrument.servo_prior import ServoPrior
+from host.sysid.estimators.servo_delay_profile import (
+    LEAST,
+    MOST,
+    Behind,
+    CoarseDelays,
+    DelayProfile,
+    Fit,
+)
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
-from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.ar_noise import fit_ar, lagged_moments
-from host.sysid.numerics.input_coherence import block_length, block_means
 
 DELAY = "servo_delay_s"
 SERVO = (DELAY, "servo_bandwidth_hz", "servo_rate_limit_radps")
-LEAST, MOST = (-0.15, 0.3, 0.2), (0.5, 60.0, 60.0)  # a delay, a bandwidth, a rate that can be
 WIDE_DELAY_S = 0.02  # one deviation: above it the search begins with delays far apart
-SCAN_S = np.arange(-0.08, 0.241, 0.04)
 RIVAL_S = 0.04  # from the best delay: another optimum, not its own slope
 FINE_S = 0.01  # between the delays about the best, at first
 STEP_SHRINKS = 5.0
 SHORT_STEPS, LEAST_STEP_S = 4.0, 3e-3  # deviations of the delay that the parabola may span
 STILL = 1e-4  # of the motion of the surface: what moves it by less moves nothing
 POSTERIOR_PRIOR_RATIO = 0.7  # of the prior's deviation: below it the data say it
-# Of the noise of output error: its memory, in means over this long; and what a model lacks at any
-# frequency, over the motion: whitened, calm air's small errors of the model would tell the delay.
-AR_ORDER, AR_STEP_S, LACK = 8, 0.02, 0.02
 COLLINEAR = 0.9  # correlation of a derivative with the servo: they cannot be separated
-
-# The third argument is a fit behind servos not far from these, to start from, or None.
-Fit = Callable[[LinearModel, Sequence[Maneuver], FitResult | None], FitResult]
-Behind = Callable[[tuple[float, float, float]], Sequence[Maneuver]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,83 +127,6 @@ class ServoEstimate:
         return replace(result, covariance=covariance)
 
 
-@dataclass
-class _Profile:
-    """Fits of a model behind servos of several delays, and what each costs."""
-
-    model: LinearModel
-    behind: Behind
-    prior: ServoPrior
-    fit: Fit
-
-    def __post_init__(self) -> None:
-        self.fits: dict[float, FitResult] = {}
-        self.costs: dict[float, float] = {}
-
-    def ask(self, delays_s: Sequence[float]) -> None:
-        """Fit at some delays; one at which the fit fails is left out."""
-        for delay_s in (round(float(d), 5) for d in delays_s):
-            if delay_s in self.fits or not LEAST[0] <= delay_s <= MOST[0]:
-                continue
-            near = min(self.fits, key=lambda known: abs(known - delay_s), default=None)
-            start = None if near is None else self.fits[near]
-            data = self.behind((delay_s, *self.prior.mean[1:]))
-            try:
-                found = self.fit(self.model, data, start)
-            except IdentificationError:
-                continue
-            self.fits[delay_s] = found
-            far = (delay_s - self.prior.mean[0]) / self.prior.sd[0]
-            self.costs[delay_s] = _cost(found, data) + 0.5 * far**2
-
-    @property
-    def best(self) -> float:
-        """The delay that costs least."""
-        if not self.costs:
-            raise IdentificationError("no delay at which the fit comes about")
-        return min(self.costs, key=self.costs.__getitem__)
-
-    @property
-    def hollows(self) -> list[float]:
-        """The delays asked that cost less than both beside them."""
-        at = sorted(self.costs)
-        costs = [np.inf, *(self.costs[d] for d in at), np.inf]
-        return [d for k, d in enumerate(at) if costs[k + 1] < min(costs[k], costs[k + 2])]
-
-
-class CoarseDelays:
-    """Delays far apart by a method that looks for where to begin; searched once, when asked.
-
-    Parameters
-    ----------
-    model : LinearModel
-    behind : callable
-        Maneuvers with the surfaces behind servos of these numbers.
-    prior : ServoPrior
-    quick : callable
-        The method.
-    """
-
-    def __init__(self, model: LinearModel, behind: Behind, prior: ServoPrior, quick: Fit) -> None:
-        self._profile = _Profile(model, behind, prior, quick)
-
-    @cached_property
-    def _asked(self) -> _Profile:
-        outwards = sorted(SCAN_S.tolist(), key=lambda d: abs(d - self._profile.prior.mean[0]))
-        self._profile.ask(outwards)
-        return self._profile
-
-    @property
-    def best(self) -> float:
-        """The delay that costs least."""
-        return self._asked.best
-
-    @property
-    def hollows(self) -> list[float]:
-        """The delays that cost less than both beside them."""
-        return self._asked.hollows
-
-
 def estimate_servo(
     model: LinearModel,
     behind: Behind,
@@ -238,7 +156,7 @@ def estimate_servo(
     IdentificationError
         If the search fails.
     """
-    profile = _Profile(model, behind, prior, fit)
+    profile = DelayProfile(model, behind, prior, fit)
     wide = prior.sd[0] > WIDE_DELAY_S
     step = FINE_S if wide else prior.sd[0]
     profile.ask([coarse.best if wide else prior.mean[0]])
@@ -257,7 +175,7 @@ def estimate_servo(
     return replace(found, rival_s=rival_s)
 
 
-def _rival(profile: _Profile, best: float, hollows: Sequence[float]) -> float | None:
+def _rival(profile: DelayProfile, best: float, hollows: Sequence[float]) -> float | None:
     """Return a delay that fits better than the best one near the start; None without any."""
     asked = [d for d in hollows if abs(d - best) >= RIVAL_S]
     profile.ask(asked)
@@ -265,7 +183,7 @@ def _rival(profile: _Profile, best: float, hollows: Sequence[float]) -> float | 
     return min(better, key=profile.costs.__getitem__) if better else None
 
 
-def _least(profile: _Profile, step: float) -> tuple[float, float, float, float]:
+def _least(profile: DelayProfile, step: float) -> tuple[float, float, float, float]:
     """Return the delay of the least cost by a parabola, the delay asked next to it, the step, and
     the curvature.
 
@@ -290,39 +208,6 @@ def _least(profile: _Profile, step: float) -> tuple[float, float, float, float]:
         step /= STEP_SHRINKS
 
 
-def _cost(found: FitResult, data: Sequence[Maneuver]) -> float:
-    """Return minus the logarithm of the likelihood of a fit, but for a constant.
-
-    Of output error in noise with a memory, estimated beside; innovations are white.
-    """
-    if found.residual_kind == "innovation":
-        # What was not measured has no innovation, and zeros would pass for small ones in their
-        # covariance: the filter's own cost counts what was. It has the prior in it, which those
-        # of whole data leave out.
-        if any(m.held for m in data):
-            return float(np.asarray(found.details["cost"]))
-        residuals = np.concatenate(found.residuals)
-        return 0.5 * len(residuals) * float(np.linalg.slogdet(np.cov(residuals.T))[1])
-    motion = np.std(np.concatenate(found.residuals) + np.concatenate(found.fitted), axis=0)
-    total = 0.0
-    for j in range(len(motion)):
-        left = [
-            block_means(
-                r[:, j : j + 1],
-                block_length(m.dt_s, AR_STEP_S),
-                None if m.sampled is None else m.sampled[:, j],
-            )[:, 0]
-            for r, m in zip(found.residuals, data, strict=True)
-        ]
-        count = sum(len(r) - AR_ORDER for r in left)
-        none = [np.zeros((len(r), 0)) for r in left]
-        moments = lagged_moments(left, none, AR_ORDER)
-        moments += count * (LACK * motion[j]) ** 2 * np.eye(AR_ORDER + 1)
-        _, innovation = fit_ar(moments, AR_ORDER)
-        total += 0.5 * count * float(np.log(max(innovation / count, 1e-300)))
-    return total
-
-
 def _colour(found: FitResult) -> float:
     """Return the factor by which coloured innovations widen: the median over the parameters."""
     if found.residual_kind != "innovation":
@@ -333,7 +218,7 @@ def _colour(found: FitResult) -> float:
     return float(np.sqrt(max(np.median(ratio), 1.0))) if len(ratio) else 1.0
 
 
-def _servo_shift(profile: _Profile, delay_s: float, k: int, count: int) -> list[Array]:
+def _servo_shift(profile: DelayProfile, delay_s: float, k: int, count: int) -> list[Array]:
     """Return the shift of parameters and delay for one deviation of bandwidth or rate limit.
 
     With the bandwidth the delay moves so that their sum stays: the data see little else.

@@ -10,9 +10,8 @@ from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.estimators.filter_error_gust import fit_gust_state
 from host.sysid.estimators.method_fit import fit
+from host.sysid.estimators.servo_delay_profile import CoarseDelays, Fit
 from host.sysid.estimators.servo_parameters import (
-    CoarseDelays,
-    Fit,
     ServoEstimate,
     considered_servo,
     estimate_servo,

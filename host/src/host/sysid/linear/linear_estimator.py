@@ -26,7 +26,8 @@ from host.sysid.linear.linear_stages import LinearEstimate, LinearIntervals, Lin
 from host.sysid.linear.linear_validation import linear_validation
 from host.sysid.linear.model_names import DEFAULT_METHOD, GUST
 from host.sysid.linear.prepared_columns import prepare_columns
-from host.sysid.models.diagnostics import assess_identifiability, collinearity, constant_inputs
+from host.sysid.models.collinearity import collinearity, constant_inputs
+from host.sysid.models.diagnostics import assess_identifiability
 from host.sysid.models.fit_result import without_parameters
 from host.sysid.models.modal_analysis import modes
 from host.sysid.models.state_space_model import LinearModel

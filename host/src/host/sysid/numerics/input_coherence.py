@@ -27,11 +27,19 @@ import numpy as np
 from scipy import special
 
 from host.arrays import Array, BoolArray
-from host.sysid.models.covariance_root import covariance_root
-from host.sysid.numerics.ar_noise import ArNoise, choose_order, fit_ar, lagged_moments
+from host.sysid.numerics.ar_noise import ArNoise
 from host.sysid.numerics.information_inverse import (
     covariance_from_information,
-    identified_inverse,
+)
+from host.sysid.numerics.input_drive import (
+    FittedParameters,
+    OutputData,
+    added_power,
+    gram,
+    noise_model,
+    reduced_normal,
+    total_score,
+    whiten,
 )
 from host.sysid.numerics.input_regressors import input_regressors, lag_knots_s
 from host.sysid.numerics.model_error_signatures import model_error_signatures
@@ -46,9 +54,7 @@ ROUNDS_WITHOUT, ROUNDS_BESIDE = 2, 3  # of the noise models: first without the a
 # Means over this long are tested: of quicker samples an AR model of low order cannot tell slow
 # gusts beside a sensor's white noise.
 BLOCK_S = 0.05
-FEWEST_FREEDOM = 30.0  # of the noise along a column, for a test
 SHOWS = 0.1  # of the power of noise: a known error with less takes nothing of the residual
-RANK = 1e-9  # of the largest eigenvalue of the scaled columns: less is rounding
 
 
 @dataclass(frozen=True)
@@ -144,29 +150,6 @@ class InputCoherence:
         return np.asarray(inverse @ (np.diag(self.prior_precision) + weighed) @ inverse)
 
 
-@dataclass(frozen=True)
-class _Data:
-    """Residuals, sensitivities and added columns of one output, a list entry per maneuver."""
-
-    residuals: Sequence[Array]  # (samples,)
-    slopes: Sequence[Array]  # (samples, P)
-    added: Sequence[Array]  # (samples, k)
-
-
-@dataclass(frozen=True)
-class _Fitted:
-    """The parameters in some noise: covariance, its root, and the score of the residual."""
-
-    inverse: Array
-    root: Array
-    score: Array
-
-    @classmethod
-    def of(cls, total: Array, score: Array) -> _Fitted:
-        inverse = identified_inverse(total)
-        return cls(inverse, covariance_root(inverse), score)
-
-
 def input_coherence(
     problem: OutputProblem,
     responses: Sequence[Response],
@@ -204,25 +187,25 @@ def input_coherence(
     noise = [ArNoise.white() for _ in data]
     variance = np.array([np.mean(np.concatenate(d.residuals) ** 2) for d in data])
     variance = np.maximum(variance, problem.least_variance)
-    whitened = [_whitened(d, n) for d, n in zip(data, noise, strict=True)]
+    whitened = [whiten(d, n) for d, n in zip(data, noise, strict=True)]
     for number in range(ROUNDS_WITHOUT + ROUNDS_BESIDE):
         total = np.diag(prior) + sum(
-            _gram(w.slopes) / v for w, v in zip(whitened, variance, strict=True)
+            gram(w.slopes) / v for w, v in zip(whitened, variance, strict=True)
         )
-        fitted = _Fitted.of(total, pulled + _score(whitened, variance))
+        fitted = FittedParameters.of(total, pulled + total_score(whitened, variance))
         updated = [
-            _noise_model(d, w, v, fitted, highest_order, beside=number >= ROUNDS_WITHOUT)
+            noise_model(d, w, v, fitted, highest_order, beside=number >= ROUNDS_WITHOUT)
             for d, w, v in zip(data, whitened, variance, strict=True)
         ]
         noise = [n for n, _ in updated]
         variance = np.maximum([v for _, v in updated], problem.least_variance)
-        whitened = [_whitened(d, n) for d, n in zip(data, noise, strict=True)]
-    every = np.array([_gram(w.slopes) / v for w, v in zip(whitened, variance, strict=True)])
+        whitened = [whiten(d, n) for d, n in zip(data, noise, strict=True)]
+    every = np.array([gram(w.slopes) / v for w, v in zip(whitened, variance, strict=True)])
     total = np.diag(prior) + np.sum(every, axis=0)
-    fitted = _Fitted.of(total, pulled + _score(whitened, variance))
+    fitted = FittedParameters.of(total, pulled + total_score(whitened, variance))
     ratio, p_value, columns = [], [], []
     for d, w, n, v in zip(data, whitened, noise, variance, strict=True):
-        excess, added, freedom = _added_power(d, w, n, v, _reduced(w, v, fitted))
+        excess, added, freedom = added_power(d, w, n, v, reduced_normal(w, v, fitted))
         ratio.append(excess / max(added, 1))
         columns.append(added)
         p_value.append(special.fdtrc(added, freedom, ratio[-1]) if added else 1.0)
@@ -270,7 +253,7 @@ def _data(
     responses: Sequence[Response],
     block_s: float,
     beside: Sequence[Array],
-) -> list[_Data]:
+) -> list[OutputData]:
     model, size = problem.model, len(problem.names)
     shortest_s = min(m.samples * m.dt_s for m in problem.maneuvers)
     knots_s = lag_knots_s(max(m.dt_s for m in problem.maneuvers), shortest_s)
@@ -293,18 +276,18 @@ def _data(
             left = problem.residual(number, response.y)[j]
             residuals.append(block_means(left[:, None], block, seen)[:, 0])
             extra.append(block_means(added[number], block, seen))
-        found.append(_Data(residuals, slopes, extra))
+        found.append(OutputData(residuals, slopes, extra))
     return found
 
 
-def _with_what_shows(data: list[_Data], count: int, least_variance: Array) -> list[_Data]:
+def _with_what_shows(data: list[OutputData], count: int, least_variance: Array) -> list[OutputData]:
     """Return the data without the known errors behind the first columns that no output shows."""
     power = np.zeros(data[0].slopes[0].shape[1])
     for d, least in zip(data, least_variance, strict=True):
         variance = max(float(np.mean(np.concatenate(d.residuals) ** 2)), float(least))
         power += np.sum([np.sum(J * J, axis=0) for J in d.slopes], axis=0) / variance
     kept = np.append(np.ones(count, dtype=bool), power[count:] > SHOWS)
-    return [_Data(d.residuals, [J[:, kept] for J in d.slopes], d.added) for d in data]
+    return [OutputData(d.residuals, [J[:, kept] for J in d.slopes], d.added) for d in data]
 
 
 def block_length(dt_s: float, block_s: float = BLOCK_S) -> int:
@@ -325,130 +308,3 @@ def block_means(values: Array, block: int, seen: BoolArray | None = None) -> Arr
         return np.asarray(blocks.mean(axis=1))
     weight = seen[: count * block].reshape(count, block, -1)
     return np.asarray((blocks * weight).sum(axis=1) / np.maximum(weight.sum(axis=1), 1))
-
-
-def _whitened(data: _Data, noise: ArNoise) -> _Data:
-    return _Data(
-        [noise.whiten(e[:, None])[:, 0] for e in data.residuals],
-        [noise.whiten(J) for J in data.slopes],
-        [noise.whiten(Z) for Z in data.added],
-    )
-
-
-def _gram(blocks: Sequence[Array]) -> Array:
-    return np.asarray(sum(b.T @ b for b in blocks))
-
-
-def _cross(left: Sequence[Array], right: Sequence[Array]) -> Array:
-    return np.asarray(sum(a.T @ b for a, b in zip(left, right, strict=True)))
-
-
-def _score(whitened: Sequence[_Data], variance: Array) -> Array:
-    parts = [_cross(w.slopes, w.residuals) / v for w, v in zip(whitened, variance, strict=True)]
-    return np.asarray(sum(parts))
-
-
-def _reduced(w: _Data, variance: float, fitted: _Fitted) -> tuple[Array, Array, Array]:
-    """Return information and score of the added columns, freed of the parameters; and the link."""
-    link = fitted.inverse @ _cross(w.slopes, w.added) / variance
-    inner = _gram(w.added) / variance - _cross(w.added, w.slopes) @ link / variance
-    right = _cross(w.added, w.residuals) / variance - link.T @ fitted.score
-    return inner, right, link
-
-
-def _scaled_eigen(inner: Array, w: _Data, variance: float) -> tuple[Array, Array, Array]:
-    """Return scale, eigenvalues and vectors of the columns that are not spoken for."""
-    scale = np.sqrt(np.maximum(np.diag(_gram(w.added)) / variance, 1e-300))
-    value, vector = np.linalg.eigh(inner / np.outer(scale, scale))
-    kept = value > RANK * np.max(value, initial=RANK)
-    return scale, value[kept], vector[:, kept]
-
-
-def _added_power(
-    data: _Data, w: _Data, noise: ArNoise, variance: float, reduced: tuple[Array, Array, Array]
-) -> tuple[float, int, float]:
-    """Return the power that the added columns explain, in units of noise, and both freedoms."""
-    inner, right, link = reduced
-    scale, value, vector = _scaled_eigen(inner, w, variance)
-    root = (vector / np.sqrt(value)) / scale[:, None]
-    directions = [(Z - J @ link) @ root for J, Z in zip(data.slopes, data.added, strict=True)]
-    samples = sum(len(e) for e in data.residuals)
-    known, log_variance = _known_directions(directions, noise, variance, samples)
-    parts = known.T @ (root.T @ right)
-    return float(parts @ parts), len(parts), max(2.0 / log_variance, 1.0)
-
-
-def _known_directions(
-    directions: Sequence[Array], noise: ArNoise, variance: float, samples: int
-) -> tuple[Array, float]:
-    """Return directions along which the noise's power is known, and the variance of its logarithm.
-
-    The degrees of freedom of a power are 2 / var(log power) (Satterthwaite, Biometrics Bulletin 2,
-    1946). The innovation variance has 2 / samples. The AR coefficients have the asymptotic
-    covariance R^-1 / samples; with coefficient k the power of a direction x, w when whitened, moves
-    by -2 sum w[t] x[t - k]. Slow noise is known to few degrees of freedom along slow directions:
-    those below `FEWEST_FREEDOM` are left out, for they determine nothing.
-
-    Parameters
-    ----------
-    directions : sequence of Array, shape (samples, k)
-        Of each maneuver; orthonormal when whitened, in units of noise.
-    noise : ArNoise
-    variance : float
-        Of the innovations.
-    samples : int
-
-    Returns
-    -------
-    Array, shape (k, known)
-    float
-    """
-    count, order = directions[0].shape[1], noise.order
-    if order == 0:
-        return np.eye(count), 2.0 / samples
-    slopes = np.zeros((order, count, count))
-    for x in directions:
-        w = noise.whiten(x)[order:] / variance
-        for k in range(1, order + 1):
-            slopes[k - 1] -= w.T @ x[order - k : len(x) - k]
-    slopes += np.swapaxes(slopes, 1, 2)
-    rooted = np.einsum("ab,bij->aij", noise.start_whitener, slopes)  # R^-1 = root' root
-    value, vector = np.linalg.eigh(np.einsum("aij,ajk->ik", rooted, rooted) / samples)
-    kept = value + 2.0 / samples <= 2.0 / FEWEST_FREEDOM
-    # The errors of all directions are one: those of a few AR coefficients.
-    mean = float(np.mean(value[kept])) if kept.any() else 0.0
-    return vector[:, kept], 2.0 / samples + mean
-
-
-def _noise_model(
-    data: _Data,
-    w: _Data,
-    variance: float,
-    fitted: _Fitted,
-    highest: int,
-    *,
-    beside: bool,
-) -> tuple[ArNoise, float]:
-    """Return the AR model of an output's noise and its innovation variance.
-
-    `beside` says whether the added columns take their share first.
-    """
-    own = fitted.inverse @ fitted.score
-    added: Array = np.zeros(data.added[0].shape[1])
-    root: Array = np.zeros((len(added), 0))
-    link: Array = np.zeros((len(own), len(added)))
-    if beside:
-        inner, right, link = _reduced(w, variance, fitted)
-        scale, kept, directions = _scaled_eigen(inner, w, variance)
-        root = (directions / np.sqrt(kept)) / scale[:, None]  # of the added columns' covariance
-        added = root @ (root.T @ right)
-        own = own - link @ added
-    residuals, shares = [], []
-    for e, J, Z in zip(data.residuals, data.slopes, data.added, strict=True):
-        residuals.append(e - J @ own - Z @ added)
-        shares.append(np.hstack([J @ fitted.root, (Z - J @ link) @ root]))
-    moments = lagged_moments(residuals, shares, highest)
-    count = sum(len(e) for e in residuals) - highest * len(residuals)
-    order = choose_order(moments, count)
-    coefficient, innovation = fit_ar(moments[: order + 1, : order + 1], order)
-    return ArNoise.from_coefficient(coefficient), max(innovation / count, 1e-300)

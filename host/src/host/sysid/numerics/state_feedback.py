@@ -15,22 +15,18 @@ taken out of the products of the signals (Fuller, Measurement Error Models, 1987
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from copy import copy
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.sysid.numerics.first_order_filter import first_order_filter
+from host.sysid.numerics.feedback_record import NO_FILTER, SHAPES, FeedbackRecord, Shape
 
-MOST_ROWS = 500  # that are compared; more tell no more of a few numbers
 FEWEST_ROWS = 40
 STEP_S, LONGEST_S = 0.02, 0.4  # of the delays tried
 RESPONSE_STEPS = 2  # steps: from here on a signal answers the input
-LAGS_S = (0.0, 0.1, 0.3)  # shorter ones are a delay
-WASHOUTS_S = (np.inf, 4.0, 2.0, 1.0, 0.5)
 WORTH = 0.7  # of what is left unexplained: a further signal must leave no more
 FILTER_WORTH = 0.5  # the same of a filter
 TOGETHER_WORTH = 0.25  # the same of several signals at once
@@ -39,22 +35,13 @@ MOST_SIGNALS = 4
 HOPELESS = 0.4  # R2 of all signals at their best delay, without a filter
 FEEDBACK_R2 = 0.9  # R2 from which an input is a function of the signals
 BETTER = 0.6  # of what later signals leave unexplained: earlier ones must leave no more
-LEAST_DECAY = 1e-3  # of a filter's state at the start of a record
 RIDGE = 1e-10  # of a signal's power
-WHOLE = 1e-9  # of a sample: less is rounding
 MOST_NOISE = 0.5  # of any sum of signals, and of the input: a noisier one tells no law
 NOISE_KNOWN = 0.1  # a law leaves this share of its noise at least: no better is it known
 SHARED = 0.5  # of the noise: a law that explains more than there is by this has it in the input too
 MORE = 0.5  # of what is explained, where R2 is as large as noise allows: the better delay
 WORSE = 0.01  # in R2 than on the grid: no better delay or filter
 FLAT = 0.8  # of the largest value: a lower neighbour is on no parabola with it
-IMPULSE_ROWS = 500  # of a filter's response, for its noise
-# With noise, input and signals are smoothed: the law stays as it is, and between samples is as much
-# noise as at them, which would make those delays the better ones.
-BELL = np.array([1.0, 4.0, 6.0, 4.0, 1.0]) / 16.0
-Shape = tuple[float, float]  # lag and wash-out, s
-NO_FILTER: Shape = (0.0, np.inf)
-SHAPES: tuple[Shape, ...] = tuple((lag, wash) for lag in LAGS_S for wash in WASHOUTS_S)
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,12 +105,12 @@ def feedback_law(
     if not signals:
         return None
     values, names = np.column_stack(list(signals.values())), tuple(signals)
-    record = _Record(dt_s, moved, values, windows, noise)
+    record = FeedbackRecord(dt_s, moved, values, windows, noise)
     before = _before(record)
     law = _law(record, before, names)
     if law is None and len(noise) and before.r2 >= FEEDBACK_R2:
         # All of the noise may be in the input too.
-        record = _Record(dt_s, moved, values, windows)
+        record = FeedbackRecord(dt_s, moved, values, windows)
         law = _law(record, _before(record), names)
     return law
 
@@ -132,7 +119,7 @@ def _delays() -> Array:
     return STEP_S * np.arange(round(LONGEST_S / STEP_S) + 1)
 
 
-def _before(record: _Record) -> _Found:
+def _before(record: FeedbackRecord) -> _Found:
     """Return what of earlier signals explains the input, nothing where that is hopeless."""
     if record.rows.size < FEWEST_ROWS or not float(record.target @ record.target) > 0.0:
         return _Found()
@@ -142,7 +129,7 @@ def _before(record: _Record) -> _Found:
     return _simplest(record, dict.fromkeys(SHAPES, _delays()), FEEDBACK_R2)
 
 
-def _law(record: _Record, before: _Found, names: Sequence[str]) -> FeedbackLaw | None:
+def _law(record: FeedbackRecord, before: _Found, names: Sequence[str]) -> FeedbackLaw | None:
     """Return the law, if earlier signals explain enough, and better than later ones."""
     if before.r2 < FEEDBACK_R2:
         return None
@@ -164,115 +151,9 @@ class _Grid(NamedTuple):
     noise: Array
 
 
-class _Record:
-    """The input and the signals in some windows, behind any filter and delay."""
-
-    def __init__(
-        self,
-        dt_s: float,
-        moved: Array,
-        values: Array,
-        windows: Sequence[IntArray],
-        noise: Sequence[float] = (),
-    ) -> None:
-        if len(noise):
-            windows = [np.asarray(w)[len(BELL) // 2 : -(len(BELL) // 2)] for w in windows]
-            moved, *smoothed = (np.convolve(x, BELL, "same") for x in (moved, *values.T))
-            values = np.column_stack(smoothed)
-        stride = max(1, -(-sum(len(w) for w in windows) // MOST_ROWS))
-        kept = [np.asarray(w)[::stride] for w in windows if len(w)]
-        self.dt_s = dt_s
-        self.values = values - values[0]
-        self._behind: dict[Shape, Array] = {}  # the signals, of single filters of the grid
-        self.rows: IntArray = np.concatenate(kept) if kept else np.zeros(0, dtype=np.int64)
-        self.sizes = np.array([len(w) for w in kept])
-        self.target = self._centred(moved[self.rows][None, :, None])[0, :, 0]
-        self.power = np.zeros(1 + values.shape[1])  # of white noise, before it is smoothed
-        if len(noise):
-            self.power = (self.rows.size - self.sizes.size) * np.square(noise)
-
-    def of_signals(self, signals: Sequence[int]) -> _Record:
-        """Return the same with some of the signals alone."""
-        fewer = copy(self)
-        fewer.values, fewer._behind = self.values[:, list(signals)], {}
-        fewer.power = self.power[[0, *(1 + k for k in signals)]]
-        return fewer
-
-    def _centred(self, values: Array) -> Array:
-        """Return values (delays, rows, columns) without the mean of each window."""
-        if not values.size:
-            return values
-        starts = np.concatenate([[0], np.cumsum(self.sizes)[:-1]])
-        means = np.add.reduceat(values, starts, axis=1) / self.sizes[None, :, None]
-        return np.asarray(values - np.repeat(means, self.sizes, axis=1))
-
-    def products(self, shape: Shape, delays: Array) -> tuple[Array, Array]:
-        """Return products of the input and all signals, (delays, 1 + signals, 1 + signals).
-
-        With them what noise adds to the squares, (delays, 1 + signals).
-        """
-        values = self._of_grid(shape) if shape in SHAPES else self._filtered(shape, self.values)
-        whole = np.floor(delays / self.dt_s + WHOLE).astype(np.int64)
-        part = (delays / self.dt_s - whole)[:, None, None]
-        noise = self.power * np.ones((len(delays), 1))
-        if self.power.any():
-            noise[:, 0] *= BELL @ BELL
-            noise[:, 1:] *= self._noise_gain(shape, part[:, 0])
-        at = self.rows[None, :] - whole[:, None]
-        last = len(values) - 1
-        late = values[np.clip(at, 0, last)]
-        if np.max(np.abs(part)) > WHOLE:
-            late = (1.0 - part) * late + part * values[np.clip(at - 1, 0, last)]
-        target = np.broadcast_to(self.target[None, :, None], (*late.shape[:2], 1))
-        both = np.concatenate([target, self._centred(late)], axis=2)
-        for decay in self._free_decays(shape):
-            both -= decay[:, None] * (decay @ both)[:, None, :]
-        return np.asarray(both.transpose(0, 2, 1) @ both), noise
-
-    def _noise_gain(self, shape: Shape, part: Array) -> Array:
-        """Return the power of white noise, smoothed, behind a filter, (delays, 1)."""
-        impulse = np.zeros(IMPULSE_ROWS)
-        impulse[1 : 1 + len(BELL)] = BELL
-        response = self._filtered(shape, impulse)
-        between = (1.0 - part) * response[1:] + part * response[:-1]
-        return np.asarray(np.sum(between**2, axis=1, keepdims=True))
-
-    def _filtered(self, shape: Shape, values: Array) -> Array:
-        for b, a in _sections(*shape, self.dt_s):
-            values = first_order_filter(b, a, values)
-        return values
-
-    def _of_grid(self, shape: Shape) -> Array:
-        """Return the same of a filter of the grid, of whose parts each is run once.
-
-        In partial fractions a lag and a wash-out behind each other are b g / (1 - b - g) times the
-        signal less what either makes of it; b and g are their first coefficients.
-        """
-        lag_s, washout_s = shape
-        if lag_s > 0.0 and washout_s < np.inf:
-            b, g = (numerator[0] for numerator, _ in _sections(*shape, self.dt_s))
-            either = self._of_grid((lag_s, np.inf)) + self._of_grid((0.0, washout_s))
-            return np.asarray((self.values - either) * (b * g / (1.0 - b - g)))
-        if shape not in self._behind:
-            self._behind[shape] = self._filtered(shape, self.values)
-        return self._behind[shape]
-
-    def _free_decays(self, shape: Shape) -> list[Array]:
-        """Return an orthonormal basis of the responses to a filter's unknown initial state."""
-        found: list[Array] = []
-        for time_s in shape:
-            if not 0.0 < time_s < np.inf:
-                continue
-            decay = np.exp(-self.rows * self.dt_s / time_s)
-            decay = self._centred(decay[None, :, None])[0, :, 0]
-            for other in found:
-                decay = decay - other * (other @ decay)
-            if (size := float(np.sqrt(decay @ decay))) > LEAST_DECAY:
-                found.append(decay / size)
-        return found
-
-
-def _simplest(record: _Record, delays_s: Mapping[Shape, Array], least_r2: float = 0.0) -> _Found:
+def _simplest(
+    record: FeedbackRecord, delays_s: Mapping[Shape, Array], least_r2: float = 0.0
+) -> _Found:
     """Return as few signals and as simple a filter as explain the input.
 
     One signal after the other is added while it is worth it. A law of several may need them all at
@@ -336,7 +217,7 @@ def _rise(values: Array, k: int) -> float:
     return (before - after) ** 2 / (8.0 * max(2.0 * top - before - after, 1e-300))
 
 
-def _refined(record: _Record, found: _Found, names: Sequence[str]) -> FeedbackLaw:
+def _refined(record: FeedbackRecord, found: _Found, names: Sequence[str]) -> FeedbackLaw:
     """Return the law with delay and time constants between those of the grid."""
     from scipy import optimize  # where no input follows anything, nothing else loads it (0.25 s)
 
@@ -432,11 +313,3 @@ def _cleaned(own: Array, cross: Array, noise: tuple[Array, Array], r2: Array) ->
     left = np.maximum(np.maximum(left, -left - SHARED * random), NOISE_KNOWN * random)
     usable &= random < MOST_NOISE
     return _Fit(np.where(usable, 1.0 - left, 0.0), np.where(usable, explained, 0.0), gains)
-
-
-def _sections(lag_s: float, washout_s: float, dt_s: float) -> Iterator[tuple[Array, Array]]:
-    """Yield numerator and denominator of each part of the filter (Tustin)."""
-    for time_s, gains in ((lag_s, (dt_s, dt_s)), (washout_s, (2.0 * washout_s, -2.0 * washout_s))):
-        if 0.0 < time_s < np.inf:
-            size = 2.0 * time_s + dt_s
-            yield np.array(gains) / size, np.array([1.0, (dt_s - 2.0 * time_s) / size])

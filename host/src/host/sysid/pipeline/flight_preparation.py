@@ -93,22 +93,7 @@ def prepare(given: FlightAtHand) -> PreparedFlight:
     fed_back = feedback_findings({**columns, **commands}, found)
     agreed = _agreement(given, columns, instrument, sensors)
     sensors = agreed.sensors
-    instrument = sensors if known else None
-    told = agreed.found if how.corrections else None
-    unplaced = sensors.recorded(read.recording)
-    by_default = None if known else by_calibration_alone(unplaced, told)
-    flight = reconstruct_flight(
-        columns,
-        found,
-        source=given.source,
-        airframe=known.airframe if known else None,
-        # Without sensor positions a vane ahead of the CG looks like a delayed one.
-        compatibility=agreed.found if known is not None and how.corrections else None,
-        by_default=by_default,
-        instrument=instrument,
-        resolution=read.resolution,
-        maker=read.recording.maker,
-    )
+    flight = _reconstructed(given, columns, found, agreed)
     corrected = with_thrust(flight.corrected, known.powerplant if known else None)
     angles, line = _hidden_angles(flight.corrected, agreed.found, known)
     reconstructed = agreed.found is not None and known is not None
@@ -141,6 +126,30 @@ def prepare(given: FlightAtHand) -> PreparedFlight:
     given_twice = overlap_notes(how.stretches)
     said = (*read.notes, *travel, *open_notes, *given_twice, *agreed.notes, *line, *unused)
     return PreparedFlight(flight, agreed.found, said, agreed.unchecked)
+
+
+def _reconstructed(
+    given: FlightAtHand,
+    columns: Mapping[str, Array],
+    maneuvers: Sequence[DetectedManeuver],
+    agreed: _Agreement,
+) -> ReconstructedFlight:
+    """Correct the columns by the aircraft file and what the sensors say, else by calibration."""
+    read, known = given.read, given.known
+    told = agreed.found if given.how.corrections else None
+    unplaced = agreed.sensors.recorded(read.recording)
+    return reconstruct_flight(
+        columns,
+        maneuvers,
+        source=given.source,
+        airframe=known.airframe if known else None,
+        # Without sensor positions a vane ahead of the CG looks like a delayed one.
+        compatibility=told if known else None,
+        by_default=None if known else by_calibration_alone(unplaced, told),
+        instrument=agreed.sensors if known else None,
+        resolution=read.resolution,
+        maker=read.recording.maker,
+    )
 
 
 def _sensors(given: FlightAtHand, instrument: SensorErrorModel | None) -> SensorErrorModel:

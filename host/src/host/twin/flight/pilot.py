@@ -18,10 +18,10 @@ from host.twin.testcard.cards import (
     duration_s,
     input_s,
     length_s,
-    sine_inputs,
 )
 from host.twin.testcard.flown_by_logger import AT_ARMED_S, LEVEL_S, SWITCH_S
 from host.twin.testcard.input_shapes import STEPS, staircase
+from host.twin.testcard.sine_inputs import sine_inputs
 
 CROSSOVER_RADPS = 1.2  # of attitude control by eye; a person on the ground manages about 1-2 rad/s
 WINDOW_TAIL_S = 3.0

@@ -19,10 +19,6 @@ from host.twin.testcard.input_shapes import (
     KINDS,
     STEPS,
     harmonics,
-    multisine,
-    multisine_signal,
-    sweep_signal,
-    tone_signal,
 )
 
 FOLDER = Path(__file__).parent / "cards"
@@ -246,24 +242,6 @@ def length_s(card: Card, s: Segment) -> float:
 def input_s(s: Segment) -> float:
     """Return the length of an input itself."""
     return sum(length for _, length in STEPS.get(s.kind, ())) * s.width_s or s.duration_s
-
-
-def sine_inputs(s: Segment, t_s: Array) -> list[Array]:
-    """Return the inputs of a multisine or a sweep in units of their amplitude, one per axis.
-
-    Parameters
-    ----------
-    s : Segment
-        Of a kind that has no steps.
-    t_s : Array, shape (n,)
-        Time from the start of the input.
-    """
-    if s.tones:
-        return [tone_signal(t_s, s.duration_s, s.tones_of(axis)) for axis in s.axes]
-    if s.kind == "multisine":
-        sums = multisine(s.duration_s, s.low_hz, s.high_hz, len(s.axes))
-        return [multisine_signal(t_s, s.duration_s, *one) for one in zip(*sums, strict=True)]
-    return [sweep_signal(t_s, s.duration_s, s.low_hz, s.high_hz)] * len(s.axes)
 
 
 def _table(where: str, value: object) -> dict[str, object]:
