@@ -37,7 +37,14 @@ from host.twin.flight.draws import draw, true_airframe
 from host.twin.virtual import virtual_flight
 
 from studies.study_table import Cell, Table, markdown
-from studies.tuned_flights.closed_loop_flight import AXES, ClosedLoop, Demand, Flown, fly
+from studies.tuned_flights.closed_loop_flight import (
+    AXES,
+    LONGEST_STEP_S,
+    ClosedLoop,
+    Demand,
+    Flown,
+    fly,
+)
 from studies.tuned_flights.linear_flight import fly_linear
 from studies.tuned_flights.measured_margins import computed, measured
 from studies.tuned_flights.px4_autotune import autotuned
@@ -145,7 +152,8 @@ class Craft:
             servo_rate_radps=servo * frame.servo_rate_radps,
             cg_m=frame.cg_m - np.array([back * frame.chord_m, 0.0, 0.0]),
         )
-        pulse_s = float(rng.uniform(0.0, PULSE_PERIOD_S))
+        # On the flight's own steps: between them a pulse would be flown at another time.
+        pulse_s = LONGEST_STEP_S * int(rng.uniform(0.0, PULSE_PERIOD_S) / LONGEST_STEP_S)
         at = solve(frame, speed_mps)
         return ClosedLoop(frame, at, self.laws, self.gains, pulse_s, self.full_rad, self.pair)
 

@@ -80,7 +80,7 @@ class ClosedLoop:
     gains : mapping of str to mapping
         By axis and role.
     pulse_s : float
-        By how much pulses come behind the law's step.
+        By how much pulses come behind the law's step; flown in whole `LONGEST_STEP_S`.
     full_rad : float or None
         Angle of the surface at an output of 1; None is the end of its travel.
     pair : PairProblem or None

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import html
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,20 +14,20 @@ import numpy as np
 
 from host.aircraft.file import load_measured
 from host.constants import NORMAL_95
-from host.control.actuator import actuator_of
-from host.control.autopilots.known import AUTOPILOTS, Autopilot
+from host.control.actuator import Actuator, actuator_of
+from host.control.autopilots.known import AUTOPILOTS, Autopilot, Rudder
 from host.control.axis_tuning import AxisTuning, YawTuning, changes_of
 from host.control.bandwidth_costs import bandwidth_costs
 from host.control.control_error import ControlError
 from host.control.disturbances import gyro_noise_radps
 from host.control.lateral_pair import PairProblem
-from host.control.loop_design import design
+from host.control.loop_design import STEP_SHARE, design
 from host.control.outer_loops import OuterCheck, check
 from host.control.parameter_file import Change, taken_back
 from host.control.plant import RATES
 from host.control.scenarios import Problem
 from host.control.uncertain_axis import UncertainAxis, axes_of, axes_of_models
-from host.control.verification import UNSEEN
+from host.control.verification import UNSEEN, Required
 from host.control.yaw_design import PairMargins, design_yaw
 
 if TYPE_CHECKING:
@@ -236,19 +237,19 @@ def tune(
             loaded.scalars.get("geometry.span_m", 0.0),
             noise.get(name, 0.0),
         )
-        best = design(problem, seed=seed)
-        costs = bandwidth_costs(problem, best.gains) if best.gains else []
         usual = {one.name: one.default for one in problem.structure.settings.values()}
         # Where no firmware has the gains yet, none was before.
         before = logged if chosen.words else usual
-        found.append(AxisTuning(problem, best, before, tuple(costs)))
+        found.append(AxisTuning(problem, design(problem, seed=seed), before))
     flown = () if isinstance(source, Sequence) else _airspeeds_mps(source)
     notes = list(_notes(found, chosen, logged, flown))
     yaw = None
     try:
-        yaw = _rudder(chosen, aircraft, found, seed)
+        found, yaw = _with_rudder(chosen, aircraft, found, seed)
     except ControlError as error:
         notes.append(f"no yaw damper: {error}")
+    found = [replace(one, costs=tuple(bandwidth_costs(one.problem, one.design.gains)))
+             if one.design.gains else one for one in found]  # fmt: skip
     outer = tuple(_around(chosen, found, logged, seed))
     return Tuning(chosen, loaded.name, tuple(found), tuple(notes), dated.isoformat(), yaw, outer)
 
@@ -264,20 +265,38 @@ def _around(
                 yield check(outer, one.problem, one.design.gains, 1000 * seed + 900)
 
 
-def _rudder(
+def _with_rudder(
     chosen: Autopilot, aircraft: str, axes: Sequence[AxisTuning], seed: int
-) -> YawTuning | None:
-    """Return the rudder around tuned roll gains; None where the autopilot flies no damper."""
+) -> tuple[list[AxisTuning], YawTuning | None]:
+    """Return axes and rudder; None where the autopilot flies no damper.
+
+    The fastest roll gains stand at their limit: where no damper keeps theirs beside them, those of
+    a step more may leave it room.
+    """
+    found = list(axes)
     if chosen.yaw is None:
-        return None
-    roll = next((one for one in axes if one.axis == "roll" and one.design.gains), None)
-    if roll is None or roll.design.gains is None:
+        return found, None
+    roll = next((one for one in found if one.axis == "roll" and one.design.gains), None)
+    if roll is None:
         raise ControlError("roll has no gains to tune it around")
+    rudder = partial(_rudder, chosen.yaw, actuator_of(aircraft, "yaw"), seed=seed)
+    yaw = rudder(roll)
+    if yaw.design.gains is None:
+        more = Required().scaled(1.0 + STEP_SHARE)
+        softer = replace(roll, design=design(roll.problem, seed=seed, asked=more))
+        other = rudder(softer) if softer.design.gains else yaw
+        if other.design.gains is not None:
+            found[found.index(roll)], yaw = softer, other
+    return found, yaw
+
+
+def _rudder(law: Rudder, drive: Actuator, roll: AxisTuning, *, seed: int) -> YawTuning:
+    """Return the rudder around roll gains."""
     axis = roll.problem.axis
     if "N_dr" not in axis.names:
         raise ControlError(f"model '{axis.template}' has no rudder, expected lateral with N_dr")
-    law = chosen.yaw(roll.before, axis.trim.airspeed_mps)
-    problem = PairProblem(roll.problem, roll.design.gains, actuator_of(aircraft, "yaw"), law)
+    structure = law(roll.before, axis.trim.airspeed_mps)
+    problem = PairProblem(roll.problem, roll.design.gains or {}, drive, structure)
     return YawTuning(problem, design_yaw(problem, seed=seed), roll.before)
 
 

@@ -36,6 +36,10 @@ class Required:
         phase = 1.0 - float(np.min(found.phase_deg)) / self.phase_deg
         return max(gain, 0.0) + max(phase, 0.0)
 
+    def scaled(self, factor: float) -> Required:
+        """Return both multiplied."""
+        return Required(factor * self.gain_db, factor * self.phase_deg)
+
     def tightened(self, worst: tuple[float, float], least_share: float) -> Required:
         """Return margins for the next design: each by what unseen aircraft lacked of it.
 

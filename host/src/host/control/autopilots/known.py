@@ -24,6 +24,8 @@ from host.control.parameter_file import (
     toml_text,
 )
 
+Rudder = Callable[[Mapping[str, float], float], YawStructure]
+
 
 @dataclass(frozen=True)
 class Autopilot:
@@ -47,7 +49,7 @@ class Autopilot:
     name: str
     structure: Callable[[str, Mapping[str, float], float], Structure]
     text: Writer
-    yaw: Callable[[Mapping[str, float], float], YawStructure] | None = None
+    yaw: Rudder | None = None
     outer: Callable[[Mapping[str, float]], tuple[OuterLoop, ...]] | None = None
     travel_rad: float | None = None
 
