@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -199,10 +200,19 @@ def test_parameters_go_out_and_come_back(tmp_path: Path, autopilot: str) -> None
     assert read_parameters(old) == {"RLL_RATE_P": 0.08, "RLL_RATE_D": 0.0}
 
 
+def test_mission_planner_loads_every_line_that_is_no_comment() -> None:
+    # ParamFile.cs and mavparm.py: lines of other than two items are skipped without a word.
+    changes = [Change("RLL_RATE_P", 0.12, 0.08, "s"), Change("KFF_RDDRMIX", 1.0, None, "")]
+    text = AUTOPILOTS["ardupilot"].text(changes, {"aircraft": "my trainer, blue"})
+    kept = [re.split(r"[ ,\t]+", one) for one in text.splitlines() if not one.startswith("#")]
+    assert kept == [["RLL_RATE_P", "0.12"], ["KFF_RDDRMIX", "1"]]
+
+
 def test_files_of_ground_stations_have_their_own_lines() -> None:
     one = [Change("FW_RR_P", 0.07, 0.05, "")]
     heading = {"aircraft": "a"}
-    assert "RR_P,0.07  # before: 0.05" in AUTOPILOTS["ardupilot"].text(one, heading)
+    lines = AUTOPILOTS["ardupilot"].text(one, heading).splitlines()
+    assert lines == ["# aircraft: a", "# FW_RR_P before: 0.05", "FW_RR_P,0.07"]
     assert AUTOPILOTS["px4"].text(one, heading).splitlines()[-1] == "1\t1\tFW_RR_P\t0.07\t9"
     cli = AUTOPILOTS["inav"].text([Change("fw_p_roll", 9, 5, "")], heading)
     assert cli.splitlines() == [
@@ -304,7 +314,7 @@ def test_a_rudders_gains_go_out_with_the_others() -> None:
     found = Tuning(AUTOPILOTS["ardupilot"], "mine", (), (), yaw=yaw)
     assert found.gains == {"YAW2SRV_DAMP": 0.75, "KFF_RDDRMIX": 0.5}
     assert [one.name for one in found.changes] == ["YAW2SRV_DAMP"]
-    assert "YAW2SRV_DAMP,0  # before: 0.75" in found.to_restore()
+    assert "# YAW2SRV_DAMP before: 0.75\nYAW2SRV_DAMP,0\n" in found.to_restore()
     assert "at the rudder:         at least 8.0 dB, 50 deg" in found.to_text()
     assert found.margins["yaw"]["both_disk"] == 0.7
     rest = YawTuning(mixed, YawDesign(None, margins, 1), before)

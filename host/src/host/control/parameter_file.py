@@ -1,6 +1,7 @@
 """Parameters of an autopilot in the files that ground stations load and save.
 
-Mission Planner: ``NAME,VALUE``, what follows a # is a comment (ExtLibs/Utilities/ParamFile.cs).
+Mission Planner: ``NAME,VALUE`` and nothing behind it, or the line is skipped; comments are lines of
+their own (ExtLibs/Utilities/ParamFile.cs 2f6c1d7; MAVProxy the same, pymavlink/mavparm.py 036b8ac).
 QGroundControl: vehicle, component, name, value and type between tabs (developer guide, parameter
 file). INAV: lines of its command line, ``set name = value`` (docs/Cli.md). The
 logger: TOML, whose heading is keys; elsewhere it is comments.
@@ -86,9 +87,10 @@ def _comments(heading: Heading) -> list[str]:
 
 
 def mission_planner_text(changes: Iterable[Change], heading: Heading) -> str:
-    """Return new values as Mission Planner loads them, the old one beside each."""
+    """Return new values as Mission Planner loads them, the old one above each."""
     lines = _comments(heading)
-    lines += [f"{one.name},{one.new:g}  # {one.before}" for one in changes]
+    for one in changes:
+        lines += [f"# {one.name} {one.before}", f"{one.name},{one.new:g}"]
     return "\n".join(lines) + "\n"
 
 
