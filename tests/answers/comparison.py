@@ -104,7 +104,8 @@ def _estimate(name: str, old: list[Any], new: list[Any], tolerance: float) -> It
         share = abs(now - was) / half if half else float("inf")
         yield f"{name} {was:.9g} -> {now:.9g}, by {share:.2g} half-widths"
     if abs(other - half) > tolerance * half + ROUNDING * half:
-        yield f"{name} half-width {half:.9g} -> {other:.9g}, by {abs(other / half - 1):.2g} of it"
+        share = abs(other / half - 1) if half else float("inf")  # one that was left out has none
+        yield f"{name} half-width {half:.9g} -> {other:.9g}, by {share:.2g} of it"
 
 
 def _unknown(estimate: list[Any]) -> bool:

@@ -133,7 +133,7 @@ def unknown_sensors(
     recording = recording or Recording()
     errors = errors_without_file(recording.maker, calibration)
     return SensorErrorModel(
-        nowhere, nowhere, upwash=0.1, vane_hz_per_mps=1.0, vane_damping=0.1,
+        nowhere, nowhere, upwash=0.0, vane_hz_per_mps=1.0, vane_damping=0.1,
         vane_friction_rad=0.0, friction_speed_mps=1.0, pitot_lag_s=0.010,
         errors=errors, recording=recording,
     )  # fmt: skip

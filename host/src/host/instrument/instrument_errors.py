@@ -62,6 +62,8 @@ class NamedError:
         The tolerance of an aircraft file that gives it; empty: none.
     origins : tuple of str
         Where each width comes from, one per sensor; empty: from `source`, a default.
+    mean : float
+        What is expected of it, and taken out of the columns: of errors that nature has to one side.
     """
 
     name: str
@@ -73,6 +75,7 @@ class NamedError:
     source: str
     aircraft_file: str = ""
     origins: tuple[str, ...] = ()
+    mean: float = 0.0
 
     @property
     def sigmas(self) -> tuple[float, ...]:
@@ -114,6 +117,20 @@ class InstrumentErrors:
     def __iter__(self) -> Iterator[NamedError]:
         """Go through all errors."""
         return iter(self.named.values())
+
+    def about_none(self) -> InstrumentErrors:
+        """Return the same for columns as they are: root mean squares in place of deviations."""
+        one_sided = {
+            e.name: replace(
+                e,
+                width=tuple(math.hypot(e.mean, sigma) for sigma in e.sigmas),
+                distribution="normal",
+                mean=0.0,
+            )
+            for e in self
+            if e.mean
+        }
+        return InstrumentErrors({**self.named, **one_sided})
 
     def scaled(self, factor: float, *names: str) -> InstrumentErrors:
         """Return a copy in which the named errors, or all, are `factor` times as large."""
@@ -177,7 +194,9 @@ def errors_without_file(maker: str, calibration: Calibration | None = None) -> I
     for name, table in tomllib.loads(NO_FILE.read_text(encoding="utf-8"))["error"].items():
         # A sensor of others is known no better by what nobody knows of it.
         if name not in stated and (maker == OWN or name not in _of_maker(maker)):
-            found[name] = _apply_table(found[name], table, f"{NO_FILE.name}: [error.{name}]")
+            kept = {k: v for k, v in table.items() if k in KEYS}
+            usual = _apply_table(found[name], kept, f"{NO_FILE.name}: [error.{name}]")
+            found[name] = replace(usual, mean=table.get("mean", 0.0))
     return InstrumentErrors(found)
 
 

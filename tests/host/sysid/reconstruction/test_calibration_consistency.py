@@ -40,10 +40,10 @@ def drawn(rng: np.random.Generator, times: float, noise: Array) -> tuple[Array, 
     A direct look at every error with noise of its own, and the file for a prior: what a linear
     reconstruction does.
     """
-    stated = np.array([PRIOR[n][1] for n in NAMES])
+    expected, stated = np.array([PRIOR[n] for n in NAMES]).T
     looked = rng.normal(0.0, times * stated) + rng.normal(0.0, noise * stated)
     posterior = 1.0 / (1.0 / stated**2 + 1.0 / (noise * stated) ** 2)
-    return posterior * looked / (noise * stated) ** 2, np.diag(posterior)
+    return expected + posterior * looked / (noise * stated) ** 2, np.diag(posterior)
 
 
 @pytest.mark.parametrize(("times", "least", "most"), [(1.0, 0.0, 0.03), (3.0, 0.99, 1.0)])

@@ -20,7 +20,7 @@ from host.sysid.reconstruction.sensor_corrections import (
     corrections,
     pressure_share,
 )
-from host.sysid.reconstruction.sensor_dynamics import columns_at_cg
+from host.sysid.reconstruction.sensor_dynamics import columns_at_cg, without_expected_errors
 
 if TYPE_CHECKING:
     from host.aircraft.mass_properties import AirframeData
@@ -157,11 +157,14 @@ def reconstruct_flight(
         at_cg = advance_delayed(columns, sensor_errors)
         if airframe is not None:
             at_cg = transfer_to_cg(at_cg, airframe)
+        elif by_default is not None and by_default.instrument is not None:
+            at_cg = without_expected_errors(at_cg, by_default.instrument.errors)
     corrected = at_cg
     if standing is not None:
         corrected = correct_columns(at_cg, sensor_errors, pressure_share(standing))
+    by = "the aircraft file" if airframe is not None else "what is usual of vanes without a file"
     record = (
-        *change_of(columns, at_cg, "as sensors without delay at the CG", "the aircraft file"),
+        *change_of(columns, at_cg, "as sensors without delay at the CG", by),
         *change_of(at_cg, corrected, "sensor errors removed", "the reconstruction estimates them"),
     )
     return ReconstructedFlight(

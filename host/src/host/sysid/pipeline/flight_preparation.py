@@ -155,7 +155,10 @@ def _reconstructed(
 def _sensors(given: FlightAtHand, instrument: SensorErrorModel | None) -> SensorErrorModel:
     """Return the instrument of a flight, or what is usual of its maker's; what is known better."""
     sensors = instrument or unknown_sensors(given.read.recording, _calibration(given))
-    return sensors if given.errors is None else replace(sensors, errors=given.errors)
+    errors = sensors.errors if given.errors is None else given.errors
+    if given.how.equations or not given.how.corrections:  # columns stay as they are
+        errors = errors.about_none()
+    return replace(sensors, errors=errors)
 
 
 def _calibration(given: FlightAtHand) -> Calibration | None:

@@ -209,14 +209,17 @@ def prior(
         "pitot_scale": float(np.hypot(sd["pitot_scale"], density_share(i))),
         "pitot_zero_pa": sd["pitot_zero_pa"],
     }
-    result |= {name: (0.0, known[name]) for name in (*FLOW, *PITOT)}
+    flow = e["vane_flow_share"].mean
+    expected = {FLOW[0]: flow, FLOW[2]: flow}
+    result |= {name: (expected.get(name, 0.0), known[name]) for name in (*FLOW, *PITOT)}
     pitot = (i.pitot_lag_s, max(i.pitot_lag_s, sd["pitot_delay_s"]))
     result |= dict(zip(DELAYS, (VANE_DELAY_S, pitot), strict=True))
     # As two pairs differ: as the places of the vanes it turned up, up to five deviations of them.
     result[DELAY_DIFFERENCE] = (0.0, math.sqrt(2.0) * vane_delay_s(i, VANE_DELAY_S[0]))
     # Both were measured from the same point, so the position of the CG does not matter.
     place = float(np.hypot(sd["imu_x_m"], sd["vane_x_m"]))
-    result |= dict.fromkeys(PLACES, (0.0, place))
+    ahead = (e["vane_ahead_m"].mean, 0.0)
+    result |= {name: (m, place) for name, m in zip(PLACES, ahead, strict=True)}
     wind = (0.0, WIND_SD_MPS)
     result |= dict(zip(WITH_GPS, (GPS_DELAY_S, wind, wind), strict=True))
     of_vanes = () if vanes else (*FLOW, DELAYS[0], DELAY_DIFFERENCE, *PLACES)

@@ -17,6 +17,7 @@ from host.arrays import Array
 from host.constants import NORMAL_95
 from host.instrument.deviations import SensorErrorModel
 from host.instrument.deviations import deviations as prior_deviations
+from host.instrument.instrument_errors import InstrumentErrors
 from host.physical.recording import SURFACES
 from host.sysid.reconstruction.flight_path import AIR, DELAYS
 from host.sysid.reconstruction.path_preparation import (
@@ -72,6 +73,23 @@ def columns_at_cg(
         result[name] = compensate_lowpass(columns[name], i, dt_s)
     result = advance_in_time(result, PRESSURE, i.pitot_lag_s)
     return transfer_to_cg(result, airframe)
+
+
+def without_expected_errors(
+    columns: Mapping[str, Array], errors: InstrumentErrors
+) -> dict[str, Array]:
+    """Return columns without what is expected of vanes of which no file tells upwash and place.
+
+    Parameters
+    ----------
+    columns : mapping of (n,) arrays
+        SI, as decoded.
+    errors : InstrumentErrors
+        Without a file (`no_file.toml`).
+    """
+    flow, ahead_m = errors["vane_flow_share"].mean, errors["vane_ahead_m"].mean
+    result = {k: v / (1.0 + flow) if flow and k in ANGLES else v for k, v in columns.items()}
+    return transfer_to_cg(result, _displaced("vane_x_m", ahead_m)) if ahead_m else result
 
 
 def invert_vane_dynamics(
