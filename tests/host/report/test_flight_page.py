@@ -6,11 +6,13 @@ from pathlib import Path
 
 import pytest
 from host.cli import main
+from host.errors import UsageError
 from host.report.flight_page import flight_page
 from host.report.flight_reading import FlightRequest, read_flight
 from host.report.shown_flight import Happening, ShownFlight
 from host.report.strip_figure import overview_figure
 
+import host
 from tests.browser.chromium import PHONE, Chromium
 from tests.host.report.flights import PLANTED
 
@@ -74,6 +76,19 @@ def test_pictures_are_the_same_twice_and_name_what_is_unknown(
     assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "two.svg").read_bytes()
     assert main(["plot", str(log_file), "--png", str(tmp_path / "a.png"), "--channels", "nix"]) == 2
     assert "nix: not measured here; there are airspeed_mps" in capsys.readouterr().err
+
+
+def test_a_log_draws_itself_in_a_notebook(log_file: Path) -> None:
+    log = host.read_log(log_file)
+    pictures = log.plot("elevator_deg", "p_degps+q_degps", from_s=5.0, to_s=12.0)
+    (figure,) = pictures.values()
+    assert [axis.get_ylabel() for axis in figure.axes] == ["deg", "deg/s"]
+    assert figure.axes[0].get_xlim()[0] >= 5.0
+    page = pictures._repr_html_()
+    assert page.startswith("<img ") and page.count("<") == 1  # the name is hostile
+    assert len(next(iter(log.plot().values())).axes) >= 5
+    with pytest.raises(UsageError, match="nix: not measured"):
+        log.plot("nix")
 
 
 def test_a_loss_whose_time_nobody_knows_is_listed_and_no_folder_is_told() -> None:

@@ -29,10 +29,9 @@ from host.control.scenarios import Problem
 from host.control.uncertain_axis import UncertainAxis, axes_of, axes_of_models
 from host.control.verification import UNSEEN, Required
 from host.control.yaw_design import PairMargins, design_yaw
+from host.export.pictures import Pictures
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from host.sysid.pipeline import Identification
 
 
@@ -148,7 +147,7 @@ class Tuning:
             "notes": list(self.notes),
         }
 
-    def plot(self) -> dict[str, Figure]:
+    def plot(self) -> Pictures:
         """Return a picture of each axis with gains: steps, margins, poles and loop with bands.
 
         Raises
@@ -158,7 +157,8 @@ class Tuning:
         """
         from host.control.tuning_pictures import axis_figure
 
-        return {one.axis: axis_figure(one) for one in self.axes if one.design.gains is not None}
+        drawn = (one for one in self.axes if one.design.gains is not None)
+        return Pictures({one.axis: axis_figure(one) for one in drawn})
 
     def to_text(self) -> str:
         """Return what people read."""

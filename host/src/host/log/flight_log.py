@@ -20,6 +20,7 @@ from host.physical.columns import CHANNELS, COLUMNS
 from host.physical.session import Session, surface_sources
 from host.physical.table import Columns, SessionTable
 from host.physical.timebase import ClockFit, block_times_us, fit_gps, gps_times_ms, session_slices
+from host.plugins import plugged_in
 from host.text import shown
 from host.wire.blocks import Progress, Scan
 from host.wire.schema import Schema
@@ -30,9 +31,12 @@ from host.wire.stream import Stream, StreamStore
 if TYPE_CHECKING:
     import pandas as pd
 
+    from host.export.pictures import Pictures
+
 # A reset costs at least the schema, 14 blocks, and a second of flight as many; some may be damaged.
 _SESSIONS, _SESSION_BLOCKS = 48, 28
 _SHOWN_SESSIONS = 12
+DRAWERS = "host.log_pictures"  # entry points: what draws stands above what reads
 GAP_BETWEEN_SESSIONS_S = 2.0  # by convention, where no GPS says how long a reset took
 
 
@@ -169,6 +173,31 @@ class FlightLog:
 
     def _repr_html_(self) -> str:
         return f"<p>{escape(repr(self)[1:-1])}</p>"
+
+    def plot(
+        self, *channels: str, from_s: float | None = None, to_s: float | None = None
+    ) -> Pictures:
+        """Return strips of the flight, test points shaded: the picture of `host plot --png`.
+
+        Parameters
+        ----------
+        *channels : str
+            A strip each, such as ``"alpha_deg"`` or ``"p_degps+q_degps"``; the usual ones without.
+        from_s, to_s : float, optional
+            Part of the flight, in ``t_s``.
+
+        Raises
+        ------
+        UsageError
+            If a channel is unknown, or the span is empty.
+        LogError
+            If nothing that draws is installed.
+        """
+        drawers = plugged_in(DRAWERS)
+        if "strips" not in drawers:
+            raise LogError("nothing that draws a log is installed; install the package again")
+        drawn: Pictures = drawers["strips"].load(LogError)(self, channels, (from_s, to_s))
+        return drawn
 
     def table(self, *, aligned: bool = True) -> pd.DataFrame:
         """Return the synchronous table in SI at the identification rate.

@@ -107,13 +107,26 @@ def _of_log(wanted: FlightRequest, path: Path) -> ShownFlight:
         calibration=wanted.calibration,
         progress=progress_bar("reading", path.stat().st_size),
     )
+    return shown_log(log, test_points=wanted.maneuvers)
+
+
+def shown_log(log: FlightLog, *, test_points: bool = True) -> ShownFlight:
+    """Return one of our logs as a flight to be shown, its test points found where wanted.
+
+    Raises
+    ------
+    NotALogError
+        If it has no identification frame.
+    """
     summary = finite(summarise(log))
     columns = log.columns()
     if not len(columns["t_s"]):
-        raise NotALogError(f"{path}: no identification frame in this log; host info says what is")
-    maneuvers, notes = _maneuvers(columns) if wanted.maneuvers else ([], [])
+        raise NotALogError(
+            f"{log.path}: no identification frame in this log; host info says what is"
+        )
+    maneuvers, notes = _maneuvers(columns) if test_points else ([], [])
     return ShownFlight(
-        name=shown(path.name),
+        name=shown(log.path.name),
         columns=with_gaps(columns),
         units=UNITS,
         texts=_TEXTS,

@@ -8,9 +8,12 @@ from typing import Any
 from host.arrays import Array
 from host.errors import UsageError
 from host.export.atomic_files import atomic_write
+from host.export.pictures import Pictures
 from host.extras import install_hint
+from host.log import FlightLog
 from host.near_names import like
 from host.report.channel_list import Channel, channels_of
+from host.report.flight_reading import shown_log
 from host.report.overview import buckets, min_max
 from host.report.shown_flight import ShownFlight, quality
 from host.report.strip_list import strips_of
@@ -48,6 +51,32 @@ def write_figure(
     ending = target.suffix.lower().removeprefix(".")
     if ending not in ("png", "svg"):
         raise UsageError(f"{target}: a picture's name ends in .png or .svg")
+    mpl = _matplotlib()
+    with mpl.rc_context({"svg.hashsalt": "host", "font.size": 8}):
+        figure = _figure(flight, names, span)
+        metadata = {"Date": None} if ending == "svg" else {"Software": None}
+        with atomic_write(target) as part:
+            figure.savefig(part, format=ending, dpi=200, metadata=metadata)
+
+
+def log_strips(
+    log: FlightLog, names: tuple[str, ...], span: tuple[float | None, float | None]
+) -> Pictures:
+    """Return strips of a log in memory for a notebook: what `FlightLog.plot` returns.
+
+    Raises
+    ------
+    UsageError, NotALogError
+        As `write_figure`; the log has no identification frame.
+    """
+    flight = shown_log(log)
+    with _matplotlib().rc_context({"svg.hashsalt": "host", "font.size": 8}):
+        return Pictures({flight.name: _figure(flight, names, span)})
+
+
+def _figure(
+    flight: ShownFlight, names: tuple[str, ...], span: tuple[float | None, float | None]
+) -> Any:
     known = {one.name: one for one in channels_of(flight)}
     strips = [[known[c] for c in strip] for strip in _wanted(known, names)]
     first = flight.t_s[0] if span[0] is None else span[0]
@@ -58,12 +87,7 @@ def write_figure(
             f"--from {first:g} --to {last:g}: no samples there; the flight runs from"
             f" {flight.t_s[0]:.2f} to {flight.t_s[-1]:.2f} s"
         )
-    mpl = _matplotlib()
-    with mpl.rc_context({"svg.hashsalt": "host", "font.size": 8}):
-        figure = _strip_axes(flight, strips, inside)
-        metadata = {"Date": None} if ending == "svg" else {"Software": None}
-        with atomic_write(target) as part:
-            figure.savefig(part, format=ending, dpi=200, metadata=metadata)
+    return _strip_axes(flight, strips, inside)
 
 
 def overview_figure(flight: ShownFlight) -> Any:

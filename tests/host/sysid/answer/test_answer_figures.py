@@ -8,7 +8,8 @@ import pandas as pd
 import pytest
 from host.arrays import Array
 from host.cli import main
-from host.sysid.answer.answer_figures import draw, save_all
+from host.export.pictures import save, save_all
+from host.sysid.answer.answer_figures import draw
 from host.sysid.answer.figure_kinds import (
     Bar,
     Cloud,
@@ -17,7 +18,6 @@ from host.sysid.answer.figure_kinds import (
     histories,
     interval_bars,
     pole_map,
-    save,
     shown,
     spectra,
 )

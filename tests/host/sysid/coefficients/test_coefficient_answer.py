@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.cli import main
+from host.export.pictures import save
 from host.sysid.answer import read_truth, true_coefficients
-from host.sysid.answer.figure_kinds import Bar, interval_bars, save
+from host.sysid.answer.figure_kinds import Bar, interval_bars
 from host.sysid.coefficients import CoefficientAnswer
 from host.sysid.coefficients.coefficient_estimator import merged_windows
 from host.sysid.coefficients.coefficient_modes import coefficient_modes, quantities

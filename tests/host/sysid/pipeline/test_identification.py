@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 from host.cli import main
 from host.errors import HostError
+from host.export.pictures import Pictures
 from host.sysid.answer import MARKS, OutputPaths, read_truth, true_coefficients
 from host.sysid.answer.answer_figures import draw_coefficients
 from host.sysid.coefficients import standard_model
@@ -21,7 +22,6 @@ from host.sysid.linear import LinearEstimator
 from host.sysid.maneuvers import maneuver_detection, maneuver_selection
 from host.sysid.models import Trim, template
 from host.sysid.pipeline import Identification, ReadingOptions, prepare, read_flight
-from host.sysid.pipeline.notebook_pictures import Pictures
 from matplotlib.figure import Figure
 
 import host
@@ -97,6 +97,18 @@ def test_the_table_has_every_estimate_with_its_unit(one: Identification) -> None
     assert table.loc[("longitudinal", "Cm_de"), "widened_by"] == "Iyy"
     assert table.loc[("longitudinal", "Cm_q"), "widened_by"] == "Iyy"
     assert not table["widened_by"].str.contains("_").any()
+    kinds = {"M_q": "derivative", "Cm_q": "coefficient"}
+    assert {name: table.loc[("longitudinal", name), "kind"] for name in kinds} == kinds
+    assert table.loc[("coefficients", "delay_imu_s"), "kind"] == "delay"
+
+
+def test_the_page_has_derivatives_and_coefficients_apart(one: Identification) -> None:
+    page = one._repr_html_()
+    first, second = page.index("<p>derivatives</p>"), page.index("<p>coefficients</p>")
+    assert first < page.index("<th>M_q</th>") < second < page.index("<th>Cm_q</th>")
+    heads = [part.partition("</thead>")[0].count("<th>") for part in page.split("<thead>")[1:]]
+    assert len(heads) >= 3
+    assert max(heads) <= 9
 
 
 def test_modes_are_a_table_too(one: Identification) -> None:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from host.export.atomic_files import file_names
 from host.sysid.answer.figure_kinds import (
     Bar,
     Cloud,
@@ -17,7 +15,6 @@ from host.sysid.answer.figure_kinds import (
     histories,
     interval_bars,
     pole_map,
-    save,
     spectra,
 )
 from host.sysid.answer.frequency_pictures import frequency_pictures
@@ -78,12 +75,6 @@ def draw_all(
     for answer, label, verdict in zip(answers, labels(answers), verdicts, strict=False):
         found |= draw(answer, label, verdict, truth, findings)
     return found | (draw_coefficients(direct, verdicts[-1], flights, truth) if direct else {})
-
-
-def save_all(pictures: Mapping[str, Figure], folder: Path) -> list[Path]:
-    """Write pictures as SVG under their names and return where."""
-    named = zip(file_names(pictures), pictures.values(), strict=True)
-    return [save(figure, folder / f"{name}.svg") for name, figure in named]
 
 
 def draw(

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from host.constants import DEG_PER_RAD
 from host.errors import IdentificationError
-from host.export.atomic_files import atomic_write
 from host.extras import install_hint
 
 if TYPE_CHECKING:
@@ -347,16 +345,3 @@ def empty_figure(size: tuple[float, float]) -> Figure:
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasSVG(figure)
     return figure
-
-
-def save(figure: Figure, path: Path) -> Path:
-    """Write a figure, whole or not at all; return where.
-
-    Raises
-    ------
-    UsageError
-        If it cannot be written.
-    """
-    with atomic_write(path) as part:
-        figure.savefig(part)
-    return path

@@ -176,7 +176,8 @@ def write_outputs(
     if places.history is not None:
         written += _write_histories(places.history, answers, (*places.given, *written))
     if places.plots is not None:
-        from host.sysid.answer.answer_figures import draw_all, save_all
+        from host.export.pictures import save_all
+        from host.sysid.answer.answer_figures import draw_all
 
         drawn = draw_all(answers, direct, verdicts, flights, truth, findings)
         written += save_all(drawn, places.plots)

@@ -21,13 +21,15 @@ if TYPE_CHECKING:
     from host.sysid.linear.linear_answer import Answer
 
 COLUMNS = (
-    "value", "half_width", "unit", "relative_half_width", "verdict", "widened_by", "called",
+    "value", "half_width", "unit", "relative_half_width", "verdict", "widened_by", "called", "kind",
 )  # fmt: skip
 MODE_COLUMNS = (
     "real_1ps", "imaginary_radps", "frequency_radps", "frequency_half_width_radps",
     "damping", "damping_half_width", "known",
 )  # fmt: skip
+MODE_HEADINGS = ("rad/s", "95 % +-", "damping", "damping +-", "known")
 PLAIN = "1"  # unit of a number
+DERIVATIVE, PLACE, DELAY, COEFFICIENT = "derivative", "place", "delay", "coefficient"
 NO_CAUSE = ("", 0.0)
 
 
@@ -51,8 +53,9 @@ def estimate_table(
         By model and name. `half_width` is of the two-sided 95 % interval; `relative_half_width` is
         over the value, or over what would contribute 5 % of the largest of its equation; `unit` is
         SI and radian, ``1`` of a pure number; `verdict` is one of
-        `host.sysid.answer.marks.MARKS`, empty where nothing is judged;
-        `widened_by` is what widens the interval most; `called` is the name in words.
+        `host.sysid.answer.marks.MARKS`, empty where nothing is judged; `widened_by` is what widens
+        the interval most; `called` is the name in words; `kind` is ``derivative``, ``place`` (of a
+        sensor), ``delay`` or ``coefficient``.
     """
     rows: dict[tuple[str, str], tuple[Any, ...]] = {}
     for answer, label, verdict in zip(linear, labels(linear), verdicts, strict=False):
@@ -60,7 +63,7 @@ def estimate_table(
     if direct:
         own = _direct_rows(direct, verdicts[-1].marks)
         rows |= {(direct.template, name): row for name, row in own}
-    named = {place: (*row, in_words(place[1])) for place, row in rows.items()}
+    named = {place: (*row, in_words(place[1]), kind) for place, (kind, *row) in rows.items()}
     return _frame(named, ("model", "name"), COLUMNS)
 
 
@@ -80,6 +83,21 @@ def mode_table(
     return _frame(rows, ("model", "mode"), MODE_COLUMNS)
 
 
+def shown_tables(table: pd.DataFrame, modes: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Return what fits beneath a notebook's cell, by heading: each kind of estimate, and modes."""
+    found = {}
+    for kind in dict.fromkeys(table["kind"]):
+        own = table[table["kind"] == kind].copy()
+        own.insert(0, "in words", own["called"])
+        own["95 % +-"] = own["half_width"]
+        own["%"] = 100.0 * own["relative_half_width"]
+        wanted = ["in words", "value", "95 % +-", "unit", "%", "verdict", "widened_by"]
+        bare = [name for name in wanted if name == "value" or (own[name] != "").any()]
+        found[f"{kind}s"] = own[[name for name in bare if name != "unit" or kind != COEFFICIENT]]
+    own_modes = modes[list(MODE_COLUMNS[2:])]
+    return found | {"modes": own_modes.set_axis(MODE_HEADINGS, axis=1)}
+
+
 def _linear_rows(answer: Answer, marks: Mapping[str, str]) -> Iterator[tuple[str, tuple[Any, ...]]]:
     result = answer.result
     half = result.half_width()
@@ -89,17 +107,19 @@ def _linear_rows(answer: Answer, marks: Mapping[str, str]) -> Iterator[tuple[str
         unit = parameter_unit(answer.model, p.name)
         value = float(result.estimate[k])
         cause = answer.causes.get(p.name, "")
-        yield p.name, (value, float(half[k]), unit, share, marks.get(p.name, ""), cause)
+        mark = marks.get(p.name, "")
+        kind = PLACE if unit == "m" else DERIVATIVE
+        yield p.name, (kind, value, float(half[k]), unit, share, mark, cause)
     for name, (value, width) in answer.delays.items():
-        yield name, (value, width, "s", _share(value, width), "", "")
+        yield name, (DELAY, value, width, "s", _share(value, width), "", "")
     for d in (x for x in answer.model.delays if x.name in result.names):
         k = result.index(d.name)
         value, width = float(result.estimate[k]), float(half[k])
-        yield d.name, (value, width, "s", _share(value, width), "", "")
+        yield d.name, (DELAY, value, width, "s", _share(value, width), "", "")
     converted = converted_marks(answer, marks)
     for c in answer.coefficients:
         share, mark = _share(c.value, c.half_width), converted.get(c.name, "")
-        yield c.name, (c.value, c.half_width, PLAIN, share, mark, c.widened_by)
+        yield c.name, (COEFFICIENT, c.value, c.half_width, PLAIN, share, mark, c.widened_by)
 
 
 def _direct_rows(
@@ -107,9 +127,10 @@ def _direct_rows(
 ) -> Iterator[tuple[str, tuple[Any, ...]]]:
     for d in answer.fit.derivatives:
         cause = answer.causes.get(d.name, NO_CAUSE)[0]
-        yield d.name, (d.value, d.half_width, PLAIN, d.share, marks[d.name], cause)
+        row = (COEFFICIENT, d.value, d.half_width, PLAIN, d.share, marks[d.name], cause)
+        yield d.name, row
     for name, (value, width) in answer.delays.items():
-        yield name, (value, width, "s", _share(value, width), "", "")
+        yield name, (DELAY, value, width, "s", _share(value, width), "", "")
 
 
 def _share(value: float, half_width: float) -> float:

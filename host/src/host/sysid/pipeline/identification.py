@@ -17,7 +17,7 @@ from host.sysid.answer.summary_lines import COLUMNS, advice_lines, summary_lines
 from host.sysid.answer.verdict import judge, removed_error_lines
 from host.sysid.checks.data_finding import Finding
 from host.sysid.pipeline.arguments import chosen_stretches, numbers_of, path_of
-from host.sysid.pipeline.estimate_table import estimate_table, mode_table
+from host.sysid.pipeline.estimate_table import estimate_table, mode_table, shown_tables
 from host.sysid.pipeline.flight_at_hand import listed_flights, read_flight
 from host.sysid.pipeline.flight_preparation import prepare
 from host.sysid.reconstruction.reconstruction import Compatibility
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from host.aircraft.prior.prior_table import PriorTable
+    from host.export.pictures import Pictures
     from host.sysid.aerodynamics.coefficient import CoefficientTable
     from host.sysid.answer.autotune_opinion import Opinion
     from host.sysid.answer.marks import Verdict
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from host.sysid.linear.linear_answer import Answer
     from host.sysid.pipeline.flight_at_hand import Source
     from host.sysid.pipeline.known_aircraft import AircraftData
-    from host.sysid.pipeline.notebook_pictures import Pictures
     from host.sysid.pipeline.reading_options import ReadingOptions
     from host.sysid.pipeline.simulation import Simulation
 
@@ -138,8 +138,8 @@ class Identification:
         IdentificationError
             If matplotlib is missing.
         """
+        from host.export.pictures import Pictures
         from host.sysid.answer.answer_figures import draw_all
-        from host.sysid.pipeline.notebook_pictures import Pictures
 
         recorded = [flight.recorded for flight in self.flights]
         made = self.linear, self.coefficients, self.verdicts
@@ -306,5 +306,5 @@ class Identification:
         from host.sysid.pipeline.notebook_html import answer_html
 
         sources = ", ".join(flight.source for flight in self.flights)
-        tables = {"estimates, 95 % half-widths": self.table, "modes": self.modes}
+        tables = shown_tables(self.table, self.modes)
         return answer_html(f"identified from {sources}", self.summary_lines(), tables)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 GOOD, FAIR, POOR = "#2e7d32", "#b26a00", "#b3261e"
 COLOURS = {TRUSTED: GOOD, CAREFUL: FAIR, SMALL: FAIR}
 DIGITS = 4
+NARROW = "font-size:85%;max-width:100%"  # eight columns beneath a cell of 700 px
 
 
 def answer_html(title: str, verdict: Sequence[str], tables: Mapping[str, pd.DataFrame]) -> str:
@@ -49,7 +50,8 @@ def _table(table: pd.DataFrame) -> str:
         cells = [f"<th>{escaped(place)}</th>" for place in places]
         cells += [_cell(value) for value in values]
         rows.append(f"<tr>{''.join(cells)}</tr>")
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+    body = f"<thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody>"
+    return f'<table style="{NARROW}">{body}</table>'
 
 
 def _cell(value: Any) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.errors import IdentificationError
+from host.export.pictures import Pictures
 from host.sysid.answer.json_document import json_text
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.models.equation_file import KIND as EQUATIONS
@@ -31,7 +32,6 @@ from host.sysid.pipeline.arguments import (
 from host.sysid.pipeline.flight_at_hand import listed_flights, read_flight
 from host.sysid.pipeline.flight_preparation import prepare
 from host.sysid.pipeline.known_aircraft import aircraft_data
-from host.sysid.pipeline.notebook_pictures import Pictures
 from host.sysid.pipeline.prediction_text import simulation_document, simulation_lines
 from host.sysid.pipeline.reading_options import OfEach, joined_stretches, reading_options
 from host.sysid.pipeline.simulation import Simulation, simulate

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.errors import IdentificationError
+from host.export.pictures import Pictures
 from host.sysid.answer.figure_kinds import Trace, histories
 from host.sysid.answer.mat_file import labels
 from host.sysid.checks.small_inputs import free_motion
@@ -18,7 +19,6 @@ from host.sysid.maneuvers.maneuver_selection import excited_axes, merge_overlapp
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
 from host.sysid.models.theil_inequality import TheilInequality, theil_inequality
 from host.sysid.pipeline.notebook_html import answer_html
-from host.sysid.pipeline.notebook_pictures import Pictures
 from host.sysid.validation.free_simulation import FreeRun, fits_of, free_runs, frozen_model
 from host.sysid.validation.window_prediction import WINDOWS_S, WindowErrors, window_errors
 

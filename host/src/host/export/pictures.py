@@ -1,15 +1,16 @@
-"""Pictures for a notebook: shown beneath the cell, saved under their names."""
+"""Figures of matplotlib by name: shown beneath a notebook's cell, saved whole or not at all."""
 
 from __future__ import annotations
 
 import base64
+import html
 import io
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from host.sysid.answer.answer_figures import save_all
-from host.sysid.pipeline.notebook_html import escaped
+from host.export.atomic_files import atomic_write, file_names
+from host.text import shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,8 +53,28 @@ class Pictures(Mapping[str, "Figure"]):
         return "".join(_image(name, figure) for name, figure in self._figures.items())
 
 
+def save_all(pictures: Mapping[str, Figure], folder: Path) -> list[Path]:
+    """Write pictures as SVG under their names and return where."""
+    named = zip(file_names(pictures), pictures.values(), strict=True)
+    return [save(figure, folder / f"{name}.svg") for name, figure in named]
+
+
+def save(figure: Figure, path: Path) -> Path:
+    """Write a figure, whole or not at all; return where.
+
+    Raises
+    ------
+    UsageError
+        If it cannot be written.
+    """
+    with atomic_write(path) as part:
+        figure.savefig(part)
+    return path
+
+
 def _image(name: str, figure: Figure) -> str:
     svg_bytes = io.BytesIO()
     figure.savefig(svg_bytes, format="svg")
     text = base64.b64encode(svg_bytes.getvalue()).decode("ascii")
-    return f'<img alt="{escaped(name)}" src="data:image/svg+xml;base64,{text}"/>'
+    label = html.escape(shown(name), quote=True)
+    return f'<img alt="{label}" style="max-width:100%" src="data:image/svg+xml;base64,{text}"/>'
