@@ -18,8 +18,9 @@ from host.aircraft.linear_aircraft import load as load_aircraft
 from host.arrays import Array
 from host.log import read_log
 from host.physical.calibration import calibration_of_text
+from host.planning.flight_envelope import Envelope
 from host.planning.learning_card import NAMES, learned_axes
-from host.planning.logger_card import Envelope, logger_card
+from host.planning.logger_card import logger_card
 from host.planning.onboard_sums import AxisCard
 from host.twin.flight.fly import FlightRecord
 from host.twin.outcome import truth_files

@@ -17,7 +17,8 @@ from host.live.live_stream import LiveStream
 from host.log import read_log
 from host.log.flown_inputs import FlownInput, flown_inputs
 from host.physical.calibration import calibration_of_text, load_calibration
-from host.planning.logger_card import Envelope, logger_card
+from host.planning.flight_envelope import Envelope
+from host.planning.logger_card import logger_card
 from host.twin.flight.fly import FlightRecord
 from host.twin.outcome.compare import true_times
 from host.twin.outcome.virtual_calibration import calibration

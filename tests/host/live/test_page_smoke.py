@@ -114,6 +114,39 @@ LEARNING = """(async () => {
 })()"""
 
 
+# A voice of this computer speaks once switched on, and says once what begins to hold.
+VOICE = """(async () => {
+  const { Voice } = await import("./voice.js");
+  window.SpeechSynthesisUtterance = class { constructor(text) { this.text = text; } };
+  const said = [];
+  const voices = [{ lang: "en-US", localService: false }, { lang: "en-GB", localService: true }];
+  const synthesis = { getVoices: () => voices, cancel: () => {},
+    speak: ({ text, voice }) => said.push(`${voice.lang}: ${text}`) };
+  const button = document.createElement("button");
+  const voice = new Voice(button, synthesis);
+  voice.say("too early");
+  button.click();
+  voice.say("good 93. next: rudder doublet, 3 deg, steps of 0.51 s");
+  for (const left of [7.2, 6.1]) voice.tell(`300 m from home in ${left} s: turn`);
+  button.click();
+  voice.say("too late");
+  const strange = new Voice(button, { getVoices: () => voices.slice(0, 1) });
+  strange.toggle();
+  return { said, off: document.getElementById("voice").textContent, strange: button.textContent };
+})()"""
+
+
+# The horizon in a climb to the right: sky left above, ground right below.
+HORIZON = """(async () => {
+  const { Horizon } = await import("./horizon.js");
+  const canvas = document.getElementById("horizon");
+  new Horizon(canvas).draw(50, 0);
+  const pen = canvas.getContext("2d");
+  const at = (x, y) => [...pen.getImageData(x * canvas.width, y * canvas.height, 1, 1).data];
+  return [at(0.1, 0.5), at(0.9, 0.5)].map(([red, , blue]) => (blue > red ? "sky" : "ground"));
+})()"""
+
+
 def planted(seconds: float) -> bytes:
     """Return a stream whose board and aircraft names are markup."""
     parts = sent(seconds)
@@ -145,8 +178,8 @@ def look(live: ServedPage, folder: Path) -> None:
         page.wait_for("window.hostLive && hostLive.redraws > 0 && hostLive.rows > 100", 60)
         assert page.evaluate("document.querySelectorAll('#plots .plot canvas').length") == 12
         assert page.evaluate("location.search") == ""  # the token is out of sight
-        page.wait_for("document.querySelector('#facts').textContent.includes('<img src=x>')", 60)
-        assert page.evaluate("document.querySelectorAll('#facts img, #facts script').length") == 0
+        page.wait_for("document.querySelector('#more').textContent.includes('<img src=x>')", 60)
+        assert page.evaluate("document.querySelectorAll('#more img, #more script').length") == 0
         page.press(" ", "Space", " ")
         page.wait_for("document.querySelector('#events').textContent.includes('mark 1')")
         page.click("#sound")
@@ -192,6 +225,14 @@ def look(live: ServedPage, folder: Path) -> None:
         assert learning["now"]["colour"] == "rgb(0, 0, 0)"
         assert learning["past"]["colour"] == "rgb(154, 154, 154)"
         assert learning["markup"] == 0
+        voice = page.evaluate(VOICE)
+        assert (voice["off"], voice["strange"]) == ("Voice off", "No voice here")
+        assert voice["said"] == [
+            "en-GB: voice on",
+            "en-GB: good 93. next: rudder doublet, 3 degrees, steps of 0.51 seconds",
+            "en-GB: 300 metres from home in 7.2 seconds: turn",
+        ]
+        assert page.evaluate(HORIZON) == ["sky", "ground"]
         drawn = page.evaluate(REDRAWS)
         assert drawn["often"] < 12 * 60 / 2, drawn  # of 12 plots and 60 redraws
         assert drawn["off"] < 0.01 * drawn["inked"], drawn  # rows that are added stand in place

@@ -14,6 +14,7 @@ from typing import Any
 from host.constants import RAD_PER_DEG
 from host.live.doubtful_values import DoubtfulValues
 from host.live.gps_fix import GpsFix
+from host.live.home_limit import home_view
 from host.live.link_budget import LinkBudget
 from host.live.live_sample import LiveUpdate, SlowFrame
 from host.live.live_stream import LiveStream
@@ -41,6 +42,7 @@ class FlightState:
         self.track = LiveTrack()
         self.servos = ServoWatch()
         self.doubts = DoubtfulValues()
+        self.limit_m: float | None = None  # from home
         self.preflight: Callable[[], dict[str, Any]] | None = None  # what one says, where there is
         self.events: deque[dict[str, Any]] = deque(maxlen=_EVENTS)
         self._stream = stream
@@ -50,6 +52,7 @@ class FlightState:
         self._blocks: tuple[int, float] | None = None  # and when they last grew
         self._row: dict[str, float] = {}
         self._numbered = 0
+        self._outside = False
         stream.subscribe(self._take)
 
     def received(self, size_bytes: int, update: LiveUpdate) -> None:
@@ -89,6 +92,7 @@ class FlightState:
             "switch_us": self._switch_us(),
             "gps": self._gps(),
             "who": self._who(),
+            "home": self._home(),
             "doubts": self.doubts.named(points[-1][2] if points else math.nan),
             "jumps": dict(self.servos.jumps),
             "wind_mps": self.track.wind_mps,
@@ -116,6 +120,24 @@ class FlightState:
         for fix in update.fixes:
             self._fix = fix, time.monotonic()
             self.track.add(fix, *self._motion())
+            self._leaves()
+
+    def _home(self) -> dict[str, Any] | None:
+        if self._fix is None or self.limit_m is None or not self.track.points:
+            return None
+        east, north, _ = self.track.points[-1]
+        v_north, v_east, _ = self._fix[0].velocity_mps
+        return home_view((east, north), (v_east, v_north), self.limit_m)
+
+    def _leaves(self) -> None:
+        """Say once that the aircraft has left the circle it may fly in."""
+        home = self._home()
+        if home is None:
+            return
+        outside = home["distance_m"] > home["limit_m"]
+        if outside and not self._outside:
+            self.say("warning", home["warning"])
+        self._outside = outside
 
     def _motion(self) -> tuple[float, float, float]:
         pair = [self._row.get(f"airspeed_{side}_mps", math.nan) for side in "ab"]

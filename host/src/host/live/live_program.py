@@ -29,6 +29,8 @@ from host.live.recording_watch import RecordingWatch
 from host.live.replay import ReplaySource
 from host.log.capture_head import SUFFIX, CaptureHead
 from host.physical.calibration import Calibration, calibration_of_text, load_calibration
+from host.planning.flight_envelope import Envelope
+from host.wire.flight_card import card_file, read_card
 from host.wire.schema_text import packed_schema
 
 if TYPE_CHECKING:
@@ -93,6 +95,7 @@ def run_live(
     capture = _capture(request, source, calibration)
     with capture if capture is not None else contextlib.nullcontext():
         session = LiveSession(source, LiveStream(calibration, texts, row_rate_hz), capture, tell)
+        session.state.limit_m = _limit_m(request)
         if capture is not None:
             tell(f"every byte goes to {capture.path}")
         leave = [join(session, calibration) for join in request.joins]
@@ -121,6 +124,15 @@ def run_live(
         stream.rows,
         stream.lost,
     )
+
+
+def _limit_m(request: LiveRequest) -> float:
+    """Return the largest distance from home: as asked, as the flight card says, as usual."""
+    if request.distance_m is not None:
+        return request.distance_m
+    if request.flight_card is not None:
+        return float(read_card(card_file(request.flight_card)).head["distance_max_m"])
+    return float(Envelope().distance_m)
 
 
 def _unfailing(tell: Callable[[str], None]) -> Callable[[str], None]:

@@ -53,6 +53,7 @@ class LiveRequest:
     wanted: str | None = None
     card: str | None = None
     flight_card: Path | None = None
+    distance_m: float | None = None  # largest from home; without it that of a flight card
     seed: int = 0
     opened: Source | None = None  # in place of what `source` names
     joins: list[Join] = field(default_factory=list)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from host.aircraft.air import atmosphere, density_kgpm3
@@ -18,6 +17,7 @@ from host.aircraft.trim import solve
 from host.constants import GRAVITY_MPS2
 from host.errors import UsageError
 from host.physical.calibration import Calibration
+from host.planning.flight_envelope import Envelope
 from host.planning.learning_card import TURNS, learning_parts
 from host.planning.onboard_sums import AxisCard
 from host.twin.testcard.cards import Card, Segment, input_s
@@ -27,29 +27,6 @@ from host.wire.schema_text import packed_schema
 SHAPES = {"3211": "three_two_one_one"}
 NAME_BYTES = 16
 ADC_TOP = 4 * 1023
-
-
-@dataclass(frozen=True, slots=True)
-class Envelope:
-    """What ends an input, beside sticks, switch and the recorder's health.
-
-    A value on a limit is inside. Defaults are those of a trainer's first flights.
-    """
-
-    alpha_deg: float = 8.0  # either way from trim
-    beta_deg: float = 15.0
-    bank_deg: float = 50.0
-    pitch_deg: float = 30.0
-    rates_degps: float = 150.0
-    load_least: float = 0.0
-    load_most: float = 2.5
-    height_least_m: float = 40.0
-    height_most_m: float = 200.0
-    distance_m: int = 300
-    still_ms: int = 500
-    stick_us: int = 40
-    amplitude_share: float = 1.0  # a third on the first flights
-    frequency_hz: float = 5.0
 
 
 class LoggerCardError(UsageError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -74,6 +75,9 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--card", metavar="CARD",
                         help="card that is flown (host plan): each test point gets a verdict, the"
                         " next one a countdown")  # fmt: skip
+    parser.add_argument("--distance", type=_distance, metavar="M",
+                        help="largest distance from home, drawn and warned of (default: of the"
+                        " flight card, 300)")  # fmt: skip
     parser.add_argument("--flight-card", type=Path, metavar="FILE",
                         help="with sim:CARD: file of host plan CARD --card FILE; the logger flies"
                         " its inputs and sends what it learns")  # fmt: skip
@@ -107,6 +111,7 @@ def run(args: argparse.Namespace) -> int:
         wanted=args.wanted,
         card=args.card,
         flight_card=args.flight_card,
+        distance_m=args.distance,
     )
     if args.preflight is not None:
         from host.preflight.preflight_sheet import shown_sheet
@@ -130,11 +135,19 @@ def _whole(text: str) -> int:
     return int(text)
 
 
+def _distance(text: str) -> float:
+    return _number(text, 20.0, 20_000.0, "a distance between 20 and 20000 m")
+
+
 def _rate(text: str) -> float:
+    return _number(text, 1.0, 1000.0, "a rate between 1 and 1000 Hz")
+
+
+def _number(text: str, least: float, most: float, expected: str) -> float:
     try:
         value = float(text)
     except ValueError:
-        value = 0.0
-    if not 1.0 <= value <= 1000.0:
-        raise argparse.ArgumentTypeError(f"{text} is not a rate between 1 and 1000 Hz")
+        value = math.nan
+    if not least <= value <= most:
+        raise argparse.ArgumentTypeError(f"{text} is not {expected}")
     return value

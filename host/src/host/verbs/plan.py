@@ -253,8 +253,9 @@ def _write_logger_card(card: Card, args: argparse.Namespace) -> None:
     from host.aircraft.linear_aircraft import load
     from host.export.atomic_files import atomic_write
     from host.physical.calibration import load_calibration
+    from host.planning.flight_envelope import Envelope
     from host.planning.learning_card import learned_axes
-    from host.planning.logger_card import Envelope, logger_card
+    from host.planning.logger_card import logger_card
     from host.wire.card_text import card_lines
     from host.wire.flight_card import read_card
 

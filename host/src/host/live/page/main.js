@@ -4,13 +4,15 @@ import { LEAST_AIRSPEED_MPS, words } from "./channels.js";
 import { connect } from "./connection.js";
 import { showEstimates } from "./estimates.js";
 import { History } from "./history.js";
+import { Horizon } from "./horizon.js";
 import { showLearning } from "./learning.js";
 import { showAge, showState } from "./panel.js";
-import { Plan } from "./plan.js";
+import { compass, Plan } from "./plan.js";
 import { Plots } from "./plots.js";
 import { Preflight } from "./preflight.js";
 import { Sound } from "./sound.js";
 import { Verdict } from "./verdict.js";
+import { Voice } from "./voice.js";
 
 const REDRAW_MS = 1000 / 30;
 const OLD_S = 1;
@@ -19,8 +21,10 @@ const GAPS = 4000; // latencies kept for the bench
 
 const byId = (id) => document.getElementById(id);
 const plan = new Plan(byId("plan"));
+const horizon = new Horizon(byId("horizon"));
 const sound = new Sound(byId("sound"));
-const verdict = new Verdict(sound);
+const voice = new Voice(byId("voice"));
+const verdict = new Verdict(sound, voice);
 const measured = { redraws: 0, latencies: [], rows: 0 };
 let history = null;
 let plots = null;
@@ -51,6 +55,8 @@ const server = connect({
     stateAt = performance.now();
     document.body.classList.remove("waiting");
     plan.wind = said.wind_mps;
+    plan.limitM = said.home?.limit_m ?? 0;
+    voice.tell(said.home?.warning ?? "");
     if (said.track.length) plan.add(said.track);
     showState(said);
     preflight.show(said.preflight);
@@ -93,7 +99,10 @@ function tell() {
   const age = connected ? ageS() : null;
   const old = age === null || age > OLD_S;
   document.body.classList.toggle("old", old);
-  if (old && !wasOld) sound.play([440, 330]);
+  if (old && !wasOld) {
+    sound.play([440, 330]);
+    voice.say("no data");
+  }
   wasOld = old;
   showAge(age, banner(age));
   plots.say(history, state ? state.jumps : {});
@@ -102,7 +111,7 @@ function tell() {
   byId("airspeed").textContent = words(airspeed, 1, LEAST_AIRSPEED_MPS);
   byId("height").textContent = words(history.last("height_m") ?? plan.height(), 0);
   const heading = history.last("psi_deg");
-  byId("plan-text").textContent = plan.text(heading);
+  byId("heading").textContent = heading === null ? "-" : compass(heading);
   plan.draw(heading);
 }
 
@@ -135,5 +144,6 @@ document.addEventListener("keydown", (event) => {
 if (location.search) window.history.replaceState(null, "", location.pathname);
 window.hostLive = measured;
 setInterval(tell, 200);
+setInterval(() => history && horizon.draw(history.last("phi_deg"), history.last("theta_deg")), 100);
 setInterval(() => plots && plots.describe(), 1000);
 requestAnimationFrame(frame);

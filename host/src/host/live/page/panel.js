@@ -34,6 +34,7 @@ export function showState(state) {
   byId("rail").textContent = figure(system.rail_v, 2);
   byId("supply").textContent = figure(system.supply_v, 2);
   showDoubts(state.doubts);
+  showHome(state.home);
   showFacts(state, link, system);
   showEvents(state.events);
 }
@@ -43,18 +44,31 @@ function showFacts(state, link, system) {
   const captured = state.not_recorded ? "NOT RECORDED" : state.captured_bytes === null ? "a replay: none" : `${(state.captured_bytes / 1000).toFixed(1)} kB`;
   fact(list, "ground capture", captured);
   fact(list, "rows, lost", `${link.rows}, ${link.lost}`);
-  fact(list, "bytes/s, damaged", `${link.bytes_per_s}, ${link.damaged_bytes}`, link.damaged_bytes > 0);
-  fact(list, "not sent by radio", system.not_sent ?? "-");
   fact(list, "card: dropped, errors", `${system.frames_dropped ?? "-"}, ${system.card_errors ?? "-"}`, system.frames_dropped > 0 || system.card_errors > 0);
   fact(list, "servos by", system.drive ?? "-");
-  fact(list, "switch", state.switch_us === null ? "-" : `${state.switch_us} us`);
-  fact(list, "heard of", (system.sensors ?? []).join(", ") || "-");
-  list.lastChild.className = "long";
-  fact(list, "aircraft", state.who.aircraft || "-");
-  fact(list, "firmware", [state.who.board, state.who.firmware].filter(Boolean).join(" ") || "-");
-  fact(list, "viewers", String(state.viewers));
-  fact(list, "from", state.source.split(/[\\/]/).pop());
   byId("facts").replaceChildren(list);
+  const more = document.createDocumentFragment();
+  fact(more, "switch", state.switch_us === null ? "-" : `${state.switch_us} us`);
+  fact(more, "bytes/s, damaged", `${link.bytes_per_s}, ${link.damaged_bytes}`, link.damaged_bytes > 0);
+  fact(more, "not sent by radio", system.not_sent ?? "-");
+  fact(more, "heard of", (system.sensors ?? []).join(", ") || "-");
+  more.lastChild.className = "long";
+  fact(more, "aircraft", state.who.aircraft || "-");
+  fact(more, "firmware", [state.who.board, state.who.firmware].filter(Boolean).join(" ") || "-");
+  fact(more, "viewers", String(state.viewers));
+  fact(more, "from", state.source.split(/[\\/]/).pop());
+  byId("more").replaceChildren(more);
+}
+
+// Home as the aircraft sees it: how far, where to turn, and the limit that it nears.
+export function showHome(home) {
+  byId("home-distance").textContent = figure(home?.distance_m, 0);
+  byId("home-bearing").textContent = figure(home?.bearing_deg, 0);
+  const outside = Boolean(home) && home.distance_m > home.limit_m;
+  byId("home-distance").parentElement.classList.toggle("bad", outside);
+  const limit = byId("limit");
+  limit.className = outside ? "bad" : "";
+  if (limit.textContent !== (home?.warning ?? "")) limit.textContent = home?.warning ?? "";
 }
 
 export function showDoubts(doubts) {

@@ -4,6 +4,7 @@
 export const compass = (degrees) => ((Math.round(degrees) % 360) + 360) % 360;
 
 const TRACK = "#0b3d91";
+const LIMIT = "#b00020";
 const MOST = 3000;
 const STEPS = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
 
@@ -12,6 +13,7 @@ export class Plan {
     this.canvas = canvas;
     this.points = [];
     this.wind = null;
+    this.limitM = 0;
     new ResizeObserver(() => this.draw()).observe(canvas);
   }
 
@@ -40,14 +42,15 @@ export class Plan {
   }
 
   frame(width, height) {
-    let [west, east, south, north] = [-60, 60, -60, 60];
+    const least = Math.max(60, 1.04 * this.limitM);
+    let [west, east, south, north] = [-least, least, -least, least];
     for (const [x, y] of this.points) {
       west = Math.min(west, x);
       east = Math.max(east, x);
       south = Math.min(south, y);
       north = Math.max(north, y);
     }
-    const perM = Math.min((width - 24) / (east - west), (height - 40) / (north - south));
+    const perM = Math.min((width - 8) / (east - west), (height - 8) / (north - south));
     const [x0, y0] = [(west + east) / 2, (south + north) / 2];
     return { perM, at: (x, y) => [width / 2 + (x - x0) * perM, height / 2 - (y - y0) * perM] };
   }
@@ -62,11 +65,28 @@ export class Plan {
       pen.arc(x, y, radius * place.perM, 0, 2 * Math.PI);
       pen.stroke();
     }
+    this.limit(pen, place, x, y);
     pen.fillStyle = "#000";
     pen.font = "700 12px system-ui, sans-serif";
     pen.textAlign = "left";
     pen.fillRect(x - 3, y - 3, 6, 6);
     pen.fillText("home", x + 6, y + 12);
+  }
+
+  limit(pen, place, x, y) {
+    if (!this.limitM) return;
+    pen.strokeStyle = pen.fillStyle = LIMIT;
+    pen.lineWidth = 2;
+    pen.setLineDash([8, 5]);
+    pen.beginPath();
+    pen.arc(x, y, this.limitM * place.perM, 0, 2 * Math.PI);
+    pen.stroke();
+    pen.setLineDash([]);
+    const radius = this.limitM * place.perM;
+    if (radius < 45) return;
+    pen.font = "700 12px system-ui, sans-serif";
+    pen.textAlign = "center";
+    pen.fillText(`${this.limitM.toFixed(0)} m`, x, y + radius - 5);
   }
 
   track(pen, place) {
@@ -137,12 +157,5 @@ export class Plan {
   // Metres over home by GPS.
   height() {
     return this.points.length ? this.points[this.points.length - 1][2] : null;
-  }
-
-  text(heading) {
-    if (!this.points.length) return "no position";
-    const [x, y] = this.points[this.points.length - 1];
-    const pointed = heading === null ? "" : `heading ${compass(heading)}, `;
-    return `${pointed}${Math.hypot(x, y).toFixed(0)} m from home`;
   }
 }

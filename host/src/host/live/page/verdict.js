@@ -12,8 +12,9 @@ function set(id, text) {
 }
 
 export class Verdict {
-  constructor(sound) {
+  constructor(sound, voice) {
     this.sound = sound;
+    this.voice = voice;
     this.number = null; // of the last verdict heard of; null before the first state
     this.left = null;
   }
@@ -21,18 +22,21 @@ export class Verdict {
   show(said) {
     byId("point").hidden = said === null;
     if (said === null) return;
-    this.last(said.verdicts.length ? said.verdicts[said.verdicts.length - 1] : null);
+    this.last(said.verdicts.length ? said.verdicts[said.verdicts.length - 1] : null, said.next);
     this.next(said.next);
   }
 
-  last(verdict) {
+  last(verdict, next) {
     const box = byId("point-verdict");
     const kind = verdict === null ? "" : verdict.good ? "good" : "bad";
     if (box.className !== kind) box.className = kind;
     set("point-words", verdict === null ? "no test point yet" : verdict.text);
     set("point-which", verdict === null ? "" : `point ${verdict.point}`);
     const number = verdict === null ? 0 : verdict.number;
-    if (this.number !== null && number > this.number) this.sound.play(verdict.good ? GOOD_HZ : REPEAT_HZ);
+    if (this.number !== null && number > this.number) {
+      this.sound.play(verdict.good ? GOOD_HZ : REPEAT_HZ);
+      this.voice.say(next === null ? verdict.text : `${verdict.text}. next: ${next.text}`);
+    }
     this.number = number;
   }
 
