@@ -8,6 +8,7 @@ import control
 import numpy as np
 import pytest
 from host.arrays import Array
+from host.control import ControlError
 from host.control.autopilots import ardupilot, inav, mega, px4
 from host.control.autopilots.known import AUTOPILOTS
 from host.control.autopilots.structure import state_space
@@ -183,6 +184,40 @@ def test_the_hold_of_a_roll_axis_has_the_loop_that_is_written_by_hand() -> None:
     gain, turned, *_ = control.margin((np.abs(by_hand), phase, w))
     assert found.gain_db[0] == pytest.approx(20.0 * math.log10(gain), abs=0.1)
     assert found.phase_deg[0] == pytest.approx(turned, abs=0.5)
+
+
+def test_inavs_gains_follow_the_airspeed_where_its_attenuation_is_on() -> None:
+    logged = {"apa_pow": 120.0, "fw_reference_airspeed": 1500.0}
+    law = inav.structure("roll", logged, 30.0)
+    # 15 of 30 m/s: 0.5^1.2 of P, D and FF, 0.5^0.2 of I.
+    assert inav.attenuation(30.0, law.fixed) == pytest.approx((0.4353, 0.8706), abs=1e-4)
+    gains = {"P": 31.0, "I": 0.0, "D": 0.0, "FF": 0.0}
+    angle, _ = law_response(law.loop(gains, 30.0), np.array([0.01]))
+    still, _ = law_response(inav.structure("roll", {}, 30.0).loop(gains, 30.0), np.array([0.01]))
+    assert abs(angle[0] / still[0]) == pytest.approx(0.5**1.2)
+    twice = law.completed({"P": 5.0, "D": 0.0}, 0.01)["FF"]
+    assert twice == pytest.approx(0.01 * 500.0 / math.degrees(1.0) * 31.0 / 0.4353, abs=0.5)
+
+
+def test_inav_7_limits_its_integral_in_output() -> None:
+    assert inav.structure("roll", {"fw_iterm_throw_limit": 100.0}, 15.0).fixed[
+        "integral_percent"
+    ] == pytest.approx(20.0)
+
+
+def test_names_of_older_releases_are_read_too() -> None:
+    old = {"ARSPD_FBW_MIN": 12.0, "SCHED_LOOP_RATE": 300.0}
+    found = ardupilot.structure("roll", old, 15.0)
+    assert found.fixed["airspeed_min_mps"] == 12.0
+    assert "AIRSPEED_MIN" not in found.assumed
+    assert "AIRSPEED_MAX" in found.assumed
+    both = ardupilot.structure("roll", {**old, "AIRSPEED_MIN": 13.0}, 15.0)
+    assert both.fixed["airspeed_min_mps"] == 13.0
+
+
+def test_a_law_that_is_another_is_refused() -> None:
+    with pytest.raises(ControlError, match=r"RLL2SRV_P and no RLL_RATE_P: ArduPlane before 4\.1"):
+        ardupilot.structure("roll", {"RLL2SRV_P": 1.0}, 15.0)
 
 
 def test_the_speed_scaler_ends_where_arduplane_ends_it() -> None:

@@ -12,7 +12,7 @@ import control
 import numpy as np
 import pytest
 from host.arrays import Array
-from host.control import ControlError, read_parameters
+from host.control import ControlError, read_parameters, tuning
 from host.control.actuator import Actuator, actuator_of
 from host.control.autopilots import ardupilot_yaw, mega
 from host.control.autopilots.known import AUTOPILOTS
@@ -317,6 +317,7 @@ def test_a_rudders_gains_go_out_with_the_others() -> None:
     assert "# YAW2SRV_DAMP before: 0.75\nYAW2SRV_DAMP,0\n" in found.to_restore()
     assert "at the rudder:         at least 8.0 dB, 50 deg" in found.to_text()
     assert found.margins["yaw"]["both_disk"] == 0.7
+    assert "Load half of each P, I, D and YAW2SRV_DAMP;" in found.to_text()
     rest = YawTuning(mixed, YawDesign(None, margins, 1), before)
     assert Tuning(AUTOPILOTS["ardupilot"], "mine", (), (), yaw=rest).changes == ()
 
@@ -327,6 +328,31 @@ def test_what_is_around_is_told_and_not_changed() -> None:
     assert "path (L1): at least 18.7 dB, 51 deg: NAVL1_PERIOD 17" in found.to_text()
     assert found.document()["outer_loops"]["path (L1)"]["stable"] is True
     assert found.changes == ()
+
+
+def test_roll_gains_at_their_limit_make_room_for_a_damper(monkeypatch: pytest.MonkeyPatch) -> None:
+    axis = replace(rolling(0.1), template="lateral", names=("L_p", "N_dr"))
+    asked = replace(problem(0.1), axis=axis)
+    proven = verify(problem(0.0), {"P": 0.1, "I": 0.1, "D": 0.0, "FF": 0.1, "TC": 0.5}, seed=1,
+                    required=Required())  # fmt: skip
+    margins = PairMargins((5.9, 80.0), (8.0, 50.0), 0.7, True, 0.05, 0.1, 0.06, 0.08)
+    fastest, softer = Design({"P": 0.14}, proven, 1), Design({"P": 0.13}, proven, 1)
+
+    def designed(_: Problem, *, seed: int, asked: Required) -> Design:
+        assert asked == Required(6.0 * 1.08, 45.0 * 1.08)
+        return softer
+
+    def damper(pair: PairProblem, *, seed: int) -> YawDesign:
+        return YawDesign({"DAMP": 0.5} if pair.roll_gains["P"] < 0.135 else None, margins, 1)
+
+    monkeypatch.setattr(tuning, "design", designed)
+    monkeypatch.setattr(tuning, "design_yaw", damper)
+    (roll,), yaw = tuning.with_rudder(
+        AUTOPILOTS["ardupilot"], "ultrastick25e", [AxisTuning(asked, fastest, {})], 0
+    )
+    assert roll.design is softer
+    assert yaw is not None
+    assert yaw.design.gains == {"DAMP": 0.5}
 
 
 def test_only_the_margin_that_lacked_is_asked_for_more_of() -> None:

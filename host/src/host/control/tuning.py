@@ -107,8 +107,9 @@ class Tuning:
                 f"{found.worst_gain_db:.1f} dB, {found.worst_phase_deg:.0f} deg at least in"
                 f" {UNSEEN} aircraft at {speeds} m/s",
             )
-            # Gains are positive; this turns them into the aircraft file's sign of the surface.
-            yield f"{one.problem.actuator.surface}_sense", one.problem.axis.sense
+            if not self.autopilot.words:
+                # Gains are positive; this turns them into the aircraft file's sign of the surface.
+                yield f"{one.problem.actuator.surface}_sense", one.problem.axis.sense
 
     def to_restore(self) -> str:
         """Return the file that takes them back."""
@@ -224,6 +225,9 @@ def tune(
     else:
         axes, dated = axes_of(source), date.today()
         noise = {name: _noise(source, name) for name in axes}
+    wrong = [f"{v:g}" for v in airspeeds_mps if not 0.0 < v < np.inf]
+    if wrong:
+        raise ControlError(f"airspeed {', '.join(wrong)} m/s, expected a positive number")
     loaded = load_measured(aircraft)
     logged = dict(parameters or {})
     found = []
@@ -245,7 +249,7 @@ def tune(
     notes = list(_notes(found, chosen, logged, flown))
     yaw = None
     try:
-        found, yaw = _with_rudder(chosen, aircraft, found, seed)
+        found, yaw = with_rudder(chosen, aircraft, found, seed)
     except ControlError as error:
         notes.append(f"no yaw damper: {error}")
     found = [replace(one, costs=tuple(bandwidth_costs(one.problem, one.design.gains)))
@@ -265,7 +269,7 @@ def _around(
                 yield check(outer, one.problem, one.design.gains, 1000 * seed + 900)
 
 
-def _with_rudder(
+def with_rudder(
     chosen: Autopilot, aircraft: str, axes: Sequence[AxisTuning], seed: int
 ) -> tuple[list[AxisTuning], YawTuning | None]:
     """Return axes and rudder; None where the autopilot flies no damper.
@@ -338,14 +342,19 @@ def _notes(
         yield "a saved model has no correlations: its derivatives are drawn independently"
     settings = [s for one in axes for s in one.problem.structure.settings.values()]
     own = [s for s in settings if s.name in logged]
+    told = tuple(dict.fromkeys(name for one in axes for name in one.problem.structure.assumed))
     if not own and chosen.words:
         yield (
-            "filters, loop rate and speeds are the autopilot's defaults: name its parameters with"
-            " --parameters, or a log that has them"
+            "nobody named the old gains: name the autopilot's parameters with --parameters, or a"
+            " log that has them"
         )
+    if told:
+        yield f"defaults stand for {', '.join(told)}"
+    if logged.get("tpa_rate", 0.0) > 0.0 and chosen.name == "inav":
+        yield "tpa_rate makes gains follow the throttle, which no aircraft here does: set it to 0"
     for one in own:
         value = logged[one.name]
-        if not one.lowest <= value <= one.highest:
+        if value != one.default and not one.lowest <= value <= one.highest:
             yield f"{one.name} is {value:g}, documented {one.lowest:g} to {one.highest:g}"
     speeds = sorted({v for one in axes for v in one.problem.airspeeds_mps})
     beyond = [f"{v:.1f}" for v in speeds if flown_mps and not flown_mps[0] <= v <= flown_mps[-1]]

@@ -44,7 +44,10 @@ def tuning_lines(found: Tuning) -> Iterator[str]:
         return
     yield ""
     if found.autopilot.words:
-        yield from (line.format(**found.autopilot.words) for line in FIRST_FLIGHT)
+        words = dict(found.autopilot.words)
+        if found.yaw is not None and found.yaw.design.gains:
+            words["halve"] += f" and {found.yaw.settings[found.yaw.problem.yaw.damper].name}"
+        yield from (line.format(**words) for line in FIRST_FLIGHT)
     else:
         yield "No firmware flies these gains yet: they are for a card's hold of wings and pitch."
 

@@ -66,7 +66,15 @@ def run(args: argparse.Namespace) -> int:
     if not models:
         first = Path(args.source[0])
         if not logged and is_autopilot_log(first):
-            logged = dict(read_autopilot(first).log.parameters)
+            log = read_autopilot(first).log
+            if log.autopilot == args.autopilot:
+                logged = dict(log.parameters)
+            else:
+                print(
+                    f"host: {first} is a log of {log.autopilot}, gains are for {args.autopilot}:"
+                    " its parameters are left out; name the others with --parameters",
+                    file=sys.stderr,
+                )
         source = identify(args.source, aircraft=args.aircraft)
     found = tune(
         source,

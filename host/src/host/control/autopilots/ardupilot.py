@@ -18,6 +18,7 @@ from host.arrays import Array
 from host.control.autopilots import parameter_table
 from host.control.autopilots.parameter_table import smoothing
 from host.control.autopilots.tabled import TabledAxis
+from host.control.control_error import ControlError
 
 ELEVONS, V_TAIL = {77, 78}, {79, 80}  # SERVOn_FUNCTION
 MIXED = {"roll": ELEVONS, "pitch": ELEVONS | V_TAIL, "yaw": V_TAIL}
@@ -120,8 +121,9 @@ LOGGED = {
     "gyro_filter_hz": "INS_GYRO_FILTER",
     "loop_hz": "SCHED_LOOP_RATE",
     "scaling_speed_mps": "SCALING_SPEED",
-    "airspeed_min_mps": "AIRSPEED_MIN",
-    "airspeed_max_mps": "AIRSPEED_MAX",
+    # Before 4.5 behind the bar (ArduPlane/ReleaseNotes.txt).
+    "airspeed_min_mps": "AIRSPEED_MIN|ARSPD_FBW_MIN",
+    "airspeed_max_mps": "AIRSPEED_MAX|ARSPD_FBW_MAX",
 }
 PREFIX = {"roll": "RLL", "pitch": "PTCH"}
 
@@ -137,10 +139,22 @@ def structure(axis: str, logged: Mapping[str, float], trim_mps: float) -> ArduPl
         Parameters of the log by name.
     trim_mps : float
         Airspeed of the model.
+
+    Raises
+    ------
+    ControlError
+        The log is of a release before 4.1, whose law is another.
     """
+    old, new = f"{PREFIX[axis]}2SRV_P", f"{PREFIX[axis]}_RATE_P"
+    if old in logged and new not in logged:
+        raise ControlError(
+            f"the parameters have {old} and no {new}: ArduPlane before 4.1 flies another law;"
+            " update it, and save its parameters again"
+        )
     names = {key: name.format(PREFIX[axis]) for key, name in LOGGED.items()}
     fixed = parameter_table.fixed("ardupilot", names, logged)
-    return ArduPlane(axis, fixed, trim_mps, mixer_share(axis, logged))
+    told = parameter_table.assumed(names, logged)
+    return ArduPlane(axis, fixed, trim_mps, mixer_share(axis, logged), assumed=told)
 
 
 def mixer_share(axis: str, logged: Mapping[str, float]) -> float:

@@ -32,12 +32,23 @@ def fixed(
     ----------
     autopilot : str
     names : mapping of str to str
-        The autopilot's own name of each.
+        The autopilot's own name of each; those of older releases behind a ``|``.
     logged : mapping of str to float
         Parameters by the autopilot's names.
     """
-    known = {key: float(logged[name]) for key, name in names.items() if name in logged}
+    known = {
+        key: float(logged[one])
+        for key, name in names.items()
+        for one in reversed(name.split("|"))
+        if one in logged
+    }
     return {**_document(autopilot)["fixed"], **known}
+
+
+def assumed(names: Mapping[str, str], logged: Mapping[str, float]) -> tuple[str, ...]:
+    """Return the names of parameters that stay and that a log has not."""
+    listed = (name.split("|") for name in names.values())
+    return tuple(one[0] for one in listed if not logged.keys() & set(one))
 
 
 def named(autopilot: str, table: str, logged: Mapping[str, float]) -> dict[str, float]:

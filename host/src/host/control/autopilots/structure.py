@@ -73,6 +73,10 @@ class Structure(Protocol):
         """Parameters that are tuned, by their role: ``P``, ``I``, ``D``, ``FF``, ``TC``."""
 
     @property
+    def assumed(self) -> tuple[str, ...]:
+        """Names of parameters that stay and that nobody told: defaults stand for them."""
+
+    @property
     def searched(self) -> tuple[str, ...]:
         """Roles that a search may choose; the others follow from these."""
 

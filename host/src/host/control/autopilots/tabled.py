@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 from host.control.autopilots import parameter_table
@@ -20,10 +20,13 @@ class TabledAxis:
     axis : str
     fixed : mapping
         Filters, loop rate and speeds; the log's own where it has them.
+    assumed : tuple of str
+        Names of those that are defaults, for the log has them not.
     """
 
     axis: str
     fixed: Mapping[str, float]
+    assumed: tuple[str, ...] = field(default=(), kw_only=True)
     autopilot: ClassVar[str]
     searched: ClassVar[tuple[str, ...]] = ("P", "D", "TC")
     fastest: ClassVar[str] = "actuator"
