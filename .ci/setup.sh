@@ -124,6 +124,9 @@ extras = project.get("optional-dependencies", {})
 print(",".join(sorted(extras.keys() - {"simulate"})))')"  # a compiler of 100 MB, where the clone has one
   quietly pip.log "$python" -m pip install --disable-pip-version-check --progress-bar off \
     --constraint .ci/constraints.txt "${requirements[@]}" --editable "host[$extras]"
+  # The build takes uPlot from npm; without npm its files come with a package, whose Python nobody runs.
+  [ -s build/uplot/uPlot.iife.js ] || quietly pip-uplot.log "$python" -m pip install \
+    --disable-pip-version-check --progress-bar off --constraint .ci/constraints.txt --no-deps uplot-python
   [ "$purpose" = demo ] || quietly pip-programs.log "$python" -m pip install \
     --disable-pip-version-check --progress-bar off --no-deps -r .ci/requirements-programs.txt
   printf '%s %s\n' "$purpose" "$inputs" >>.venv/setup-done

@@ -6,6 +6,7 @@ reachable: the environment, the log and the working folder are elsewhere.
 """
 
 import re
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -20,15 +21,14 @@ from tests.host.logs import ROOT
 from tests.protocol.flights import simple_log
 
 
-def run(*command: str | Path, cwd: Path) -> str:
+def run(*command: str | Path, cwd: Path, path: str = "/usr/bin:/bin") -> str:
     done = subprocess.run(
         [str(part) for part in command],
         cwd=cwd,
         capture_output=True,
         text=True,
         check=False,
-        env={"PATH": "/usr/bin:/bin", "HOME": str(cwd), "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
-        | pip_settings(),
+        env={"PATH": path, "HOME": str(cwd), "PIP_DISABLE_PIP_VERSION_CHECK": "1"} | pip_settings(),
     )
     assert done.returncode == 0, done.stderr + done.stdout
     return done.stdout
@@ -54,6 +54,11 @@ def test_wheel_decodes_a_log_outside_the_clone(tmp_path: Path) -> None:
         names = packed.namelist()
         pages = {name.rpartition("/")[2] for name in names if "/live/page/" in name}
         assert pages >= {"index.html", "style.css", "main.js", "plots.js", "icon.svg"}
+        charts = ROOT / "build" / "uplot"  # fetched by this build, or an earlier one
+        for file in charts.glob("*"):
+            assert packed.read(f"host/data/uplot/{file.name}") == file.read_bytes()
+        if shutil.which("npm", path="/usr/bin:/bin"):
+            assert b"MIT" in packed.read("host/data/uplot/LICENSE")
         (metadata,) = (name for name in names if name.endswith("METADATA"))
         needs = message_from_string(packed.read(metadata).decode()).get_all("Requires-Dist", [])
         for name, place in (
@@ -89,3 +94,30 @@ def test_wheel_decodes_a_log_outside_the_clone(tmp_path: Path) -> None:
     assert len((tmp_path / "flight.csv").read_text().splitlines()) == 201
     said = run(scripts / "host", "identify", "--method", "list", cwd=tmp_path)
     assert "hopfield-line-search" in said  # plugged in by an entry point
+
+
+def test_a_clone_without_npm_is_installed_and_its_page_says_what_is_missing(tmp_path: Path) -> None:
+    """Built where nothing was fetched before, with an empty PATH; asked before any work."""
+    clone = tmp_path / "clone"
+    tracked = run("git", "-C", ROOT, "ls-files", "-z", "host", "protocol", "hw/calibration",
+                  "firmware", cwd=tmp_path)  # fmt: skip
+    for name in filter(None, tracked.split("\0")):
+        (clone / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(ROOT / name, clone / name)
+    run(
+        *(sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", "there"),
+        clone / "host",
+        cwd=tmp_path,
+        path="/nowhere",
+    )
+    assert not (tmp_path / "there/host/data/uplot").exists()
+    asked = "import sys; sys.path.insert(0, 'there'); from host import chart_library as c;"
+    asked += (
+        " from host.cli import main; c._PACKAGE = 'nowhere'; sys.exit(main(['live', 'sim:demo']))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", asked], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2, done.stderr
+    (line,) = done.stderr.splitlines()
+    assert "needs uPlot" in line and "pip install --no-deps uplot-python==1.1.1" in line

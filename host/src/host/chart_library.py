@@ -1,20 +1,26 @@
 """uPlot (MIT), the chart library of our pages: its script and its style sheet.
 
-It comes with PyPI's uplot-python (Apache-2.0), of which only these two files are read: importing
-it would start IPython. They are shown as they are, so that a page needs no network.
+Both lie in the wheel, in a clone's build folder (`host/chart_files.py`), or in PyPI's uplot-python,
+which is never imported: that would start IPython. They are shown as they are, so that a page needs
+no network.
 """
 
 from __future__ import annotations
 
 import importlib.util
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 from host.errors import UsageError
-from host.extras import install_hint
+from host.resources import CLONE, PACKED
+from host.terminal import command_line
 
+_PLACES = (PACKED / "uplot", CLONE / "build" / "uplot")
 _PACKAGE = "uplot"
-_SCRIPT = "static/uPlot.iife.js"
-_STYLE = "static/uPlot.min.css"
+_REQUIREMENT = "uplot-python==1.1.1"  # it carries the same uPlot
+_SCRIPT = "uPlot.iife.js"
+_STYLE = "uPlot.min.css"
 
 
 def chart_script() -> str:
@@ -23,7 +29,7 @@ def chart_script() -> str:
     Raises
     ------
     UsageError
-        If uplot-python is not installed; one line that says how to.
+        If uPlot is nowhere; one line that says how to get it.
     """
     return _text(_SCRIPT)
 
@@ -34,18 +40,21 @@ def chart_style() -> str:
     Raises
     ------
     UsageError
-        If uplot-python is not installed; one line that says how to.
+        If uPlot is nowhere; one line that says how to get it.
     """
     return _text(_STYLE)
 
 
-def _text(name: str) -> str:
+def _folders() -> Iterator[Path]:
+    yield from _PLACES
     found = importlib.util.find_spec(_PACKAGE)
     for folder in (found and found.submodule_search_locations) or ():
-        path = Path(folder) / name
-        if path.is_file():
-            return path.read_text(encoding="utf-8")
-    raise UsageError(
-        f"a page with charts needs uPlot, which comes with uplot-python (extra plot):"
-        f" {install_hint('uplot-python')}"
-    )
+        yield Path(folder) / "static"
+
+
+def _text(name: str) -> str:
+    for folder in _folders():
+        if (folder / name).is_file():
+            return (folder / name).read_text(encoding="utf-8")
+    install = command_line(sys.executable, "-m", "pip", "install", "--no-deps", _REQUIREMENT)
+    raise UsageError(f"a page with charts needs uPlot: {install} (or install npm, and host again)")
