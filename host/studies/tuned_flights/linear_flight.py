@@ -16,7 +16,7 @@ def fly_linear(
 ) -> Iterator[tuple[float, list[Flown]]]:
     """Yield each airspeed with the flights of aircraft drawn, one after the step of the demand.
 
-    The surface is told as it is commanded, in mean travel. Travel ends it, and the integral its
+    What the law asks stands for the surface, in mean travel. Travel ends it, and the integral its
     limit; the servo has no rate limit here.
 
     Parameters
