@@ -17,6 +17,7 @@ from host.control.outer_loops import (
     encircles_nothing,
     height_loop,
     path_loop,
+    px4_height_loop,
     px4_loops,
 )
 from host.control.scenarios import Problem
@@ -50,6 +51,44 @@ def test_height_at_constant_speed_is_that_of_pitch_alone() -> None:
     found = height_loop(5.0, 0.3, 0.2)(15.0, W, still)
     by_hand = 1.3 / (5.0 * S) + 0.3 + 0.2 / S + 0.2 / (5.0 * S**2)
     assert np.max(np.abs(found[0] / by_hand - 1.0)) < 1e-12
+
+
+TECS = {"FW_T_ALT_TC": 4.0, "FW_T_TAS_TC": 6.0, "FW_T_PTCH_DAMP": 0.2, "FW_T_I_GAIN_PIT": 0.1,
+        "FW_T_SEB_R_FF": 0.9, "FW_T_SPDWEIGHT": 1.0}  # fmt: skip
+FILTER = {"FW_T_SPD_STD": 0.2, "FW_T_SPD_DEV_STD": 0.2, "FW_T_SPD_PRC_STD": 0.2}
+
+
+def test_px4s_height_at_constant_speed_is_that_of_pitch_alone() -> None:
+    # The path follows pitch: (1 + 1 / (T s)) (d + I / s) + ff / (T s).
+    still = {"theta_rad": AT_ONCE, "alpha_rad": 0.0 * AT_ONCE,
+             "airspeed_mps": 0.0 * AT_ONCE}  # fmt: skip
+    found = px4_height_loop(TECS, FILTER)(15.0, W, still)
+    by_hand = (1.0 + 1.0 / (4.0 * S)) * (0.2 + 0.1 / S) + 0.9 / (4.0 * S)
+    assert np.max(np.abs(found[0] / by_hand - 1.0)) < 1e-12
+    # A weight of 2 leaves height alone.
+    speed_only = px4_height_loop({**TECS, "FW_T_SPDWEIGHT": 2.0}, FILTER)(15.0, W, still)
+    assert np.max(np.abs(speed_only)) == 0.0
+
+
+def test_px4s_speed_comes_through_its_filter_step_by_step() -> None:
+    # Only the speed moves: a sine, through the filter's own update at 1 kHz and the law behind it.
+    w, dt, speed = 0.8, 1e-3, 15.0
+    sine = {"theta_rad": 0.0 * AT_ONCE[:, :1], "alpha_rad": 0.0 * AT_ONCE[:, :1],
+            "airspeed_mps": AT_ONCE[:, :1]}  # fmt: skip
+    found = px4_height_loop({**TECS, "FW_T_I_GAIN_PIT": 0.0}, FILTER)(speed, np.array([w]), sine)
+    # Gains of three deviations of 0.2 by hand: 5 sqrt(3) / 10, 1/2, 1/2, 5 sqrt(3) / 10.
+    gain = np.array([[0.5 * math.sqrt(3.0), 0.5], [0.5, 0.5 * math.sqrt(3.0)]])
+    t = dt * np.arange(round(20.0 * 2.0 * math.pi / w / dt))
+    state, told = np.zeros(2), np.empty((len(t), 2))
+    for k, now in enumerate(t):
+        told[k] = state
+        off = np.array([math.sin(w * now), w * math.cos(w * now)]) - state - [dt * state[1], 0.0]
+        state = state + [dt * state[1], 0.0] + dt * gain @ off
+    asked = -speed * told[:, 0] / 6.0
+    pitch = ((asked - speed * told[:, 1]) * 0.2 + 0.9 * asked) / (speed * 9.80665)
+    last = slice(-round(2.0 * math.pi / w / dt), None)
+    by_hand = 2j * np.mean(pitch[last] * np.exp(-1j * w * t[last]))
+    assert found[0, 0] == pytest.approx(by_hand, rel=0.01)
 
 
 @pytest.mark.parametrize(
@@ -105,6 +144,6 @@ def test_a_log_has_its_own_and_npfg_keeps_its_least_period() -> None:
     assert height.parameters["TECS_TIME_CONST"] == 3.0
     at_once = {"angle": AT_ONCE}
     # pi x 0.5 / 0.7 = 2.24 s is the least.
-    (short,) = px4_loops({"NPFG_PERIOD": 1.0})
+    short, _ = px4_loops({"NPFG_PERIOD": 1.0})
     least = path_loop(math.pi * 0.5 / 0.7, 0.7, 0.0)
     assert np.array_equal(short.loop(15.0, W, at_once), least(15.0, W, at_once))

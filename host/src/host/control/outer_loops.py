@@ -3,8 +3,9 @@
 Path: ArduPlane's L1 (AP_L1_Control.cpp, 4.7-dev) and PX4's NPFG (npfg.cpp) near a straight path are
 one law: with w = 2 pi / period the bank asked is -(w^2 y + 2 zeta w y') / g. L1 adds an integral
 (NAVL1_XTRACK_I).
-Height: ArduPlane's TECS (AP_TECS.cpp, 4.7-dev) as far as pitch goes, with height and speed weighed
-alike. The throttle stays: an answer has no thrust. PX4's TECS and INAV's nav_fw are not looked at.
+Height: TECS as far as pitch goes, of ArduPlane (AP_TECS.cpp, 4.7-dev; height and speed weighed
+alike) and of PX4 (src/lib/tecs/TECS.cpp, main 00d281a). The throttle stays: an answer has no
+thrust. INAV's nav_fw is not looked at.
 """
 
 from __future__ import annotations
@@ -178,6 +179,47 @@ def height_loop(
     return loop
 
 
+def px4_height_loop(
+    tuned: Mapping[str, float], filtered: Mapping[str, float]
+) -> Callable[[float, Array, Mapping[str, Spectra]], Spectra]:
+    """Return PX4's TECS at the demanded pitch, throttle at rest.
+
+    Height and speed errors ask a rate of g h' - V v'; its error, its integral and the rate asked
+    make the pitch, over V g. Speed and its rate are behind a filter of two states.
+
+    Parameters
+    ----------
+    tuned, filtered : mapping of str to float
+        ``FW_T_*`` of the law and of the airspeed's filter.
+    """
+    height_s, speed_s, damping, integral, ahead, weight = tuned.values()
+    at_height, at_speed = np.clip([2.0 - weight, weight], 0.0, 1.0).tolist()
+    (k00, k01), (k10, k11) = _airspeed_gains(*filtered.values())
+
+    def loop(speed_mps: float, w: Array, per_demand: Mapping[str, Spectra]) -> Spectra:
+        s = 1j * w
+        climb = speed_mps * (per_demand["theta_rad"] - per_demand["alpha_rad"])
+        both = (s + k00) * (s + k11) - k10 * (k01 - 1.0)
+        kept = ((k00 + k01 * s) * (s + k11) - (k01 - 1.0) * (k10 + k11 * s)) / both
+        slope = ((s + k00) * (k10 + k11 * s) - k10 * (k00 + k01 * s)) / both
+        speed, faster = kept * per_demand["airspeed_mps"], slope * per_demand["airspeed_mps"]
+        potential, kinetic = at_height * GRAVITY_MPS2, at_speed * speed_mps
+        asked = potential * climb / (s * height_s) - kinetic * speed / speed_s
+        error = asked + potential * climb - kinetic * faster
+        pitch = error * (damping + integral / s) + ahead * asked
+        return np.asarray(pitch / (speed_mps * GRAVITY_MPS2))
+
+    return loop
+
+
+def _airspeed_gains(speed_sd: float, rate_sd: float, process_sd: float) -> Array:
+    """Return the gains of a steady Kalman filter of speed and rate, as TECS.cpp solves it."""
+    seen, noisy = 1.0 / speed_sd, process_sd / rate_sd**2
+    root = math.sqrt(process_sd * (2.0 * seen + noisy))
+    gains = [[seen * root, noisy], [seen**2 * process_sd, noisy * root]]
+    return np.array(gains) / (seen + noisy)
+
+
 def arduplane_loops(logged: Mapping[str, float]) -> tuple[OuterLoop, ...]:
     """Return L1 and TECS' pitch with the parameters of a log, defaults where it has none."""
     path = parameter_table.named("ardupilot", "path", logged)
@@ -189,8 +231,13 @@ def arduplane_loops(logged: Mapping[str, float]) -> tuple[OuterLoop, ...]:
 
 
 def px4_loops(logged: Mapping[str, float]) -> tuple[OuterLoop, ...]:
-    """Return NPFG with the parameters of a log, its period no shorter than NPFG lets it be."""
+    """Return NPFG, its period no shorter than it lets it be, and TECS' pitch, as a log has them."""
     path = parameter_table.named("px4", "path", logged)
     period, damping, roll_s = path.values()
     law = path_loop(max(period, math.pi * roll_s / damping), damping, 0.0)
-    return (OuterLoop("path (NPFG)", "roll", path, law),)
+    height = parameter_table.named("px4", "height", logged)
+    filtered = parameter_table.named("px4", "airspeed_filter", logged)
+    return (
+        OuterLoop("path (NPFG)", "roll", path, law),
+        OuterLoop("height by pitch (TECS)", "pitch", height, px4_height_loop(height, filtered)),
+    )
