@@ -13,6 +13,7 @@ from aiohttp import web
 from host.live.ground_capture import GroundCapture
 from host.live.live_session import LiveSession
 from host.live.live_stream import LiveStream
+from host.live.map_tiles import MapTiles, open_tiles
 from host.live.page_guard import PageGuard
 from host.live.page_server import MOST_VIEWERS, PageServer
 from host.live.replay import ReplaySource
@@ -21,6 +22,7 @@ from host.log.capture_head import CaptureHead, notes_path
 from host.physical.calibration import load_calibration
 
 from tests.host.live.radio import joined, sent
+from tests.host.live.test_map_tiles import folder, picture
 
 STREAM = joined(sent(6.0))
 
@@ -45,7 +47,13 @@ class Visit:
         return await self.client.ws_connect(self.url("/ws", token), headers=headers)
 
 
-def visited(tmp_path: Path, do: Callable[[Visit], Awaitable[None]], *, lan: bool = False) -> None:
+def visited(
+    tmp_path: Path,
+    do: Callable[[Visit], Awaitable[None]],
+    *,
+    lan: bool = False,
+    tiles: MapTiles | None = None,
+) -> None:
     """Serve a session to `do`, and prove that the capture has every byte afterwards."""
     recording, capture = tmp_path / "in.radio", tmp_path / "out.radio"
     recording.write_bytes(STREAM)
@@ -57,7 +65,7 @@ def visited(tmp_path: Path, do: Callable[[Visit], Awaitable[None]], *, lan: bool
             listener = socket.create_server(("127.0.0.1", 0))
             port = listener.getsockname()[1]
             guard = PageGuard(port, ("192.0.2.7",) if lan else ())
-            runner = web.AppRunner(PageServer(session, guard).application())
+            runner = web.AppRunner(PageServer(session, guard, tiles).application())
             await runner.setup()
             await web.SockSite(runner, listener).start()
             session.start()
@@ -125,6 +133,22 @@ def test_no_path_leads_to_a_file(tmp_path: Path) -> None:
             writer.close()
 
     visited(tmp_path, do)
+
+
+def test_a_tile_comes_by_numbers_to_whoever_may_look(tmp_path: Path) -> None:
+    async def do(visit: Visit) -> None:
+        async with visit.client.get(visit.url("/tiles/3/5/2", visit.guard.viewer_token)) as answer:
+            assert (answer.status, answer.content_type) == (200, "image/png")
+            assert await answer.read() == picture(80)
+            assert "img-src 'self'" in answer.headers["Content-Security-Policy"]
+        assert await visit.status(visit.base + "/tiles/3/5/2") == 403
+        for hole in ("/tiles/3/5/7", "/tiles/0/9/9", "/tiles/99/1/1"):
+            assert await visit.status(visit.url(hole)) == 204
+        for strange in ("/tiles/3/5/-2", "/tiles/3/..%2f5/2", "/tiles/3/5/2.png", "/tiles/3/5/٢",
+                        "/tiles/3/5/" + "9" * 5000):  # fmt: skip
+            assert await visit.status(visit.url(strange)) == 404
+
+    visited(tmp_path, do, tiles=open_tiles(folder(tmp_path, picture(80))))
 
 
 def test_the_page_may_load_its_own_files_only(tmp_path: Path) -> None:

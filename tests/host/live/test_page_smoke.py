@@ -147,6 +147,27 @@ HORIZON = """(async () => {
 })()"""
 
 
+# A tile lies where its corner is: that of home below home, its neighbour in the east beside it.
+TILES = """(async () => {
+  const { Tiles, tileOf } = await import("./tiles.js");
+  const [column, row] = tileOf(51.5, -0.1, 10).map(Math.floor);
+  const tiles = new Tiles();
+  [tiles.zooms, tiles.home] = [[0, 15], [51.5, -0.1]];
+  const asked = [];
+  tiles.picture = (zoom, x, y) => { asked.push([zoom, x, y]); return zoom === 15; };
+  const drawn = [];
+  const pen = { drawImage: (_, left, top, width) => drawn.push([left, top, width]) };
+  const place = { perM: 0.5, at: (x, y) => [150 + x / 2, 100 - y / 2] };
+  tiles.draw(pen, place, 300, 200);
+  const home = tileOf(51.5, -0.1, 15).map(Math.floor);
+  const own = asked.findIndex(([, x, y]) => x === home[0] && y === home[1]);
+  const [left, top, width] = drawn[own];
+  const inside = left <= 150 && 150 < left + width && top <= 100 && 100 < top + width;
+  const covered = drawn.some(([x, y]) => x <= 0 && y <= 0);
+  return { column, row, inside, covered, width };
+})()"""
+
+
 def planted(seconds: float) -> bytes:
     """Return a stream whose board and aircraft names are markup."""
     parts = sent(seconds)
@@ -225,6 +246,10 @@ def look(live: ServedPage, folder: Path) -> None:
         assert learning["now"]["colour"] == "rgb(0, 0, 0)"
         assert learning["past"]["colour"] == "rgb(154, 154, 154)"
         assert learning["markup"] == 0
+        tiles = page.evaluate(TILES)
+        assert (tiles["column"], tiles["row"]) == (511, 340)  # as web maps number London at 10
+        assert tiles["inside"] and tiles["covered"]
+        assert tiles["width"] == pytest.approx(380.7, abs=1.0)  # 40 075 km cos(51.5 deg) / 2^15 / 2
         voice = page.evaluate(VOICE)
         assert (voice["off"], voice["strange"]) == ("Voice off", "No voice here")
         assert voice["said"] == [

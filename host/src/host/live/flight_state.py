@@ -127,7 +127,8 @@ class FlightState:
             return None
         east, north, _ = self.track.points[-1]
         v_north, v_east, _ = self._fix[0].velocity_mps
-        return home_view((east, north), (v_east, v_north), self.limit_m)
+        seen = home_view((east, north), (v_east, v_north), self.limit_m)
+        return seen | {"place_deg": self.track.home[:2] if self.track.home else None}
 
     def _leaves(self) -> None:
         """Say once that the aircraft has left the circle it may fly in."""

@@ -23,6 +23,7 @@ from host.live.live_sources import (
 )
 from host.live.live_stream import LiveStream
 from host.live.logger_learning import LoggerLearning
+from host.live.map_tiles import open_tiles
 from host.live.mavlink_bridge import MavlinkBridge
 from host.live.plotjuggler_bridge import PlotJugglerBridge
 from host.live.recording_watch import RecordingWatch
@@ -338,7 +339,8 @@ async def _page(
     listener = listening_socket(request.port, lan=request.lan)
     port = listener.getsockname()[1]
     guard = PageGuard(port, tuple(own_addresses()) if request.lan else ())
-    server = PageServer(session, guard)
+    tiles = None if request.tiles is None else open_tiles(request.tiles)
+    server = PageServer(session, guard, tiles)
     watch.say = server.recording
     quieten(tell)
     runner = web.AppRunner(server.application(), access_log=None)

@@ -19,6 +19,7 @@ from host.live.live_sources import (
     port_source,
     udp_source,
 )
+from host.live.map_tiles import open_tiles
 from host.live.replay import replay_source
 from host.live.udp_place import udp_place
 from host.physical.calibration import Calibration
@@ -54,6 +55,7 @@ class LiveRequest:
     card: str | None = None
     flight_card: Path | None = None
     distance_m: float | None = None  # largest from home; without it that of a flight card
+    tiles: Path | None = None
     seed: int = 0
     opened: Source | None = None  # in place of what `source` names
     joins: list[Join] = field(default_factory=list)
@@ -103,6 +105,8 @@ def check_request(request: LiveRequest) -> None:
     for option, place in (("--mavlink", request.mavlink), ("--plotjuggler", request.plotjuggler)):
         if place is not None:
             udp_place(option, place)
+    if request.tiles is not None:
+        open_tiles(request.tiles)
     wanted_widths(request.wanted)
     if request.aircraft:
         load_measured(request.aircraft)

@@ -18,6 +18,7 @@ from host.chart_library import chart_script, chart_style
 from host.live import google_earth
 from host.live.live_sample import LIVE_UNITS
 from host.live.live_session import LiveSession
+from host.live.map_tiles import MOST_ZOOM, MapTiles, picture_type
 from host.live.page_guard import PILOT, ROLE, PageGuard
 
 WINDOW_S = 30.0
@@ -83,10 +84,15 @@ class PageServer:
     ----------
     session : LiveSession
     guard : PageGuard
+    tiles : MapTiles, optional
+        What lies below the track.
     """
 
-    def __init__(self, session: LiveSession, guard: PageGuard) -> None:
+    def __init__(
+        self, session: LiveSession, guard: PageGuard, tiles: MapTiles | None = None
+    ) -> None:
         self.guard = guard
+        self._tiles = tiles
         self._session = session
         self._viewers: set[Viewer] = set()
         self._kept: deque[bytes] = deque(maxlen=_KEPT)
@@ -101,6 +107,7 @@ class PageServer:
         app.router.add_get("/ws", self._socket)
         app.router.add_get("/live.kml", self._link)
         app.router.add_get("/track.kml", self._track)
+        app.router.add_get(r"/tiles/{z:[0-9]{1,2}}/{x:[0-9]{1,8}}/{y:[0-9]{1,8}}", self._tile)
         app.router.add_get("/{name}", self._file)
         return app
 
@@ -158,6 +165,15 @@ class PageServer:
         kind = _TYPES["." + name.rpartition(".")[2]]
         return web.Response(body=self._files[name], content_type=kind, charset="utf-8")
 
+    async def _tile(self, request: web.Request) -> web.Response:
+        """Send a tile, or nothing: a hole in a map is no error."""
+        zoom, x, y = (int(request.match_info[one]) for one in "zxy")
+        known = self._tiles is not None and zoom <= MOST_ZOOM and max(x, y) < 1 << zoom
+        data = self._tiles.tile(zoom, x, y) if self._tiles is not None and known else None
+        if data is None:
+            return web.Response(status=204)
+        return web.Response(body=data, content_type=picture_type(data))
+
     async def _link(self, request: web.Request) -> web.Response:
         url = f"http://{request.host}/track.kml?token={request.query.get('token', '')}"
         return _kml(google_earth.network_link(url))
@@ -195,6 +211,7 @@ class PageServer:
             "units": list(LIVE_UNITS.values()),
             "window_s": WINDOW_S,
             "may_mark": viewer.role == PILOT,
+            "tiles": self._tiles.zooms if self._tiles is not None else None,
         }
 
     def _asked(self, viewer: Viewer, text: str) -> None:

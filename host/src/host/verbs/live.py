@@ -78,6 +78,9 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--distance", type=_distance, metavar="M",
                         help="largest distance from home, drawn and warned of (default: of the"
                         " flight card, 300)")  # fmt: skip
+    parser.add_argument("--tiles", type=Path, metavar="PATH",
+                        help="a map below the track: folder of z/x/y.png or .jpg, or an MBTiles"
+                        " file of such")  # fmt: skip
     parser.add_argument("--flight-card", type=Path, metavar="FILE",
                         help="with sim:CARD: file of host plan CARD --card FILE; the logger flies"
                         " its inputs and sends what it learns")  # fmt: skip
@@ -112,6 +115,7 @@ def run(args: argparse.Namespace) -> int:
         card=args.card,
         flight_card=args.flight_card,
         distance_m=args.distance,
+        tiles=args.tiles,
     )
     if args.preflight is not None:
         from host.preflight.preflight_sheet import shown_sheet

@@ -45,6 +45,7 @@ const server = connect({
     connected = true;
     recordingAt = performance.now();
     plan.points = [];
+    plan.tiles.zooms = hello.tiles;
   },
   onRows(numbers) {
     history.add(numbers);
@@ -56,6 +57,7 @@ const server = connect({
     document.body.classList.remove("waiting");
     plan.wind = said.wind_mps;
     plan.limitM = said.home?.limit_m ?? 0;
+    plan.tiles.home = said.home?.place_deg ?? null;
     voice.tell(said.home?.warning ?? "");
     if (said.track.length) plan.add(said.track);
     showState(said);

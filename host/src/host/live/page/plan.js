@@ -1,4 +1,6 @@
-// The track from above, metres east and north of home: no tiles, so nothing is missing in the field.
+// The track from above, metres east and north of home; a map below it where there is one.
+
+import { Tiles } from "./tiles.js";
 
 // Heading of a compass, 0 to 360, of any number of turns.
 export const compass = (degrees) => ((Math.round(degrees) % 360) + 360) % 360;
@@ -14,6 +16,7 @@ export class Plan {
     this.points = [];
     this.wind = null;
     this.limitM = 0;
+    this.tiles = new Tiles();
     new ResizeObserver(() => this.draw()).observe(canvas);
   }
 
@@ -34,6 +37,7 @@ export class Plan {
     pen.setTransform(dots, 0, 0, dots, 0, 0);
     pen.clearRect(0, 0, width, height);
     const place = this.frame(width, height);
+    this.tiles.draw(pen, place, width, height);
     this.rings(pen, place, width, height);
     this.track(pen, place);
     if (this.points.length) this.aircraft(pen, place, heading);
@@ -50,7 +54,7 @@ export class Plan {
       south = Math.min(south, y);
       north = Math.max(north, y);
     }
-    const perM = Math.min((width - 8) / (east - west), (height - 8) / (north - south));
+    const perM = Math.min((width - 24) / (east - west), (height - 24) / (north - south));
     const [x0, y0] = [(west + east) / 2, (south + north) / 2];
     return { perM, at: (x, y) => [width / 2 + (x - x0) * perM, height / 2 - (y - y0) * perM] };
   }
