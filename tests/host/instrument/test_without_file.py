@@ -1,6 +1,7 @@
 """Who knows less is never surer: errors without a file are no smaller than with one."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,8 +18,10 @@ from host.physical.recording import AUTOPILOT, FOREIGN, OWN, Recording
 from host.sysid.flight import reconstruct_flight
 from host.sysid.linear import Answer
 from host.sysid.reconstruction import Compatibility, SensorErrorEstimate, prior
+from studies.clean_records import AIRCRAFT, LINEAR, NAMES, flown
 from studies.wrong_flights import fly
 
+import host
 from tests.host.sysid.at_hand import identify
 from tests.host.sysid.conftest import known_sensors
 
@@ -84,6 +87,23 @@ def test_what_is_expected_of_vanes_is_taken_out_of_the_columns() -> None:
     assert flight.recorded["alpha_rad"] is columns["alpha_rad"]
     assert told_by_nothing["beta_scale"].value == flow  # paths are sought about the same
     assert told_by_nothing["vane_x_m"].value == ahead_m
+
+
+@pytest.mark.parametrize(("zero_rad", "least", "most"), [(0.0, 0.0, 0.1), (0.005, 1.0, 50.0)])
+def test_a_record_tells_the_zero_of_a_vane_where_its_model_has_none(
+    tmp_path: Path, zero_rad: float, least: float, most: float
+) -> None:
+    """Without any error M_q was known to twice its value."""
+    true = dict(zip(NAMES, AIRCRAFT[1], strict=True))
+    table = flown("smooth", AIRCRAFT[1], 0.01, np.random.default_rng(19546))
+    table["alpha_rad"] += zero_rad
+    own = tmp_path / "mine.toml"
+    start = "".join(f"{name} = {0.75 * value}\n" for name, value in true.items())
+    own.write_text(f"{LINEAR}[parameters]\n{start}", encoding="utf-8")
+    result = host.identify(table, models=own, from_s=0.0).linear[0].result
+    half = dict(zip(result.names, result.half_width(), strict=True))
+    assert all(abs(result.value(name) - value) <= half[name] for name, value in true.items())
+    assert least < half["M_q"] / abs(true["M_q"]) < most
 
 
 @pytest.fixture(scope="module")

@@ -16,10 +16,10 @@ import numpy as np
 from host.aircraft.mass_properties import Condition
 from host.arrays import Array
 from host.instrument.deviations import unknown_sensors
-from host.instrument.error_list import NOT_PAID
+from host.instrument.error_list import NOT_PAID, ZERO, error_kinds
 from host.instrument.error_sources import ErrorSource, error_sources
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate, trim_of
-from host.sysid.errors.one_step import one_step_of
+from host.sysid.errors.one_step import OneStep, one_step_of
 from host.sysid.estimators.gust_penetration import penetration_of, without_gust_penetration
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
@@ -32,7 +32,7 @@ from host.sysid.models.uncertainty import Uncertainty
 from host.sysid.numerics.model_problems import output_problem
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.reconstruction.flight_path import PITOT
-from host.sysid.reconstruction.reconstruction import Compatibility
+from host.sysid.reconstruction.reconstruction import POSTERIOR_PRIOR_RATIO, Compatibility
 from host.sysid.reconstruction.sensor_corrections import (
     INSTANTANEOUS_ERRORS,
     correct_columns,
@@ -80,14 +80,52 @@ def systematic_error_shifts(
     if one_step is None:
         return ()
     shifted = []
-    for one in _without_each(result.model, maneuvers, cuts, known, trim):
+    every = list(_without_each(result.model, maneuvers, cuts, known, trim))
+    open_share = _open_zeros(one_step, result, maneuvers, trim, every)
+    for one in every:
         estimate = result.estimate
         if not one.same(result.model, maneuvers):
             change = one_step.change(one.model, one.trim, one.maneuvers)
-            estimate = estimate + change.sum(axis=0) / one.part
+            size = open_share.get(one.error, 1.0) / one.part
+            estimate = estimate + size * change.sum(axis=0)
         gains = (1.0 + (gain - 1.0) / one.part for gain in one.gains)
         shifted.append(ShiftedEstimate(one.error, estimate, *gains))
     return tuple(shifted)
+
+
+def _open_zeros(
+    one_step: OneStep,
+    result: FitResult,
+    maneuvers: Sequence[Maneuver],
+    trim: Trim,
+    every: Sequence[_WithoutOne],
+) -> dict[str, float]:
+    """Return what a record leaves open of the zeros of its sensors, in deviations.
+
+    A constant beside the motion is told by the record where the model has none of its own: of what
+    it is not, nothing widens an interval. What it seems to be counts with its deviation, for it was
+    not taken out. Without noise the zero of alpha alone made intervals as wide as their values.
+    """
+    zeros = [
+        one
+        for one in every
+        if error_kinds()[one.error].change == ZERO
+        and one.error != PITOT_ZERO  # which moves the trim
+        and not one.same(result.model, maneuvers)
+    ]
+    if not zeros:
+        return {}
+    wider = one_step.widened_in(result)
+    step = one_step.joint(
+        result.model,
+        trim,
+        maneuvers,
+        [(one.model, one.maneuvers) for one in zeros],
+        [1.0 / wider] * len(zeros),
+    )
+    left = np.hypot(step.added, wider * np.sqrt(np.diag(step.covariance)))
+    told = zip(zeros, left, strict=True)
+    return {one.error: float(size) for one, size in told if size < POSTERIOR_PRIOR_RATIO}
 
 
 def systematic_residuals(
