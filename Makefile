@@ -23,7 +23,7 @@ demo: ## fly a virtual flight through the recorder, identify it, open the report
 test: setup ## run every test (STAGES="lint native" runs some)
 	@$(PYTHON) .ci/stages.py $(STAGES)
 
-docs: ## pages as a searchable site, with the API from the docstrings: build/docs/site
+docs: setup sitl ## pages as a searchable site, with the API and the notebooks run: build/docs/site
 	@python3 .ci/docs/site.py
 
 release: setup ## wheel, images of both compilers, list of parts and hashes: build/release

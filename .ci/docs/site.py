@@ -1,4 +1,4 @@
-"""`make docs`: the pages of this clone as a searchable site, with the API from its docstrings.
+"""`make docs`: the pages of this clone as a searchable site, with API and notebooks that were run.
 
 Pages keep their places, so that their links work; what they link to and is no page (a picture, a
 settings file) is copied beside them. The site needs no network: build/docs/site/index.html.
@@ -16,7 +16,11 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "build" / "docs"
 PAGES, SITE, VENV = OUT / "pages", OUT / "site", OUT / "venv"
+# Where `make setup` left `host`: the notebooks run in it.
+HOST_PYTHON = ROOT / ".venv" / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
 REQUIREMENTS = ROOT / ".ci" / "requirements-docs.txt"
+# The theme breaks no line of a table, and lets the answer of a notebook run over.
+CSS = ".wy-table-responsive table td{white-space:normal} .rst-content div>pre{font-size:80%}"
 LARGEST = 2_000_000  # bytes of a file that a page links to
 COPIED = (".md", ".svg", ".png", ".jpg", ".toml", ".csv", ".h", ".json", ".html", ".cff", ".txt")
 USERS = (
@@ -27,7 +31,7 @@ USERS = (
 
 
 def main() -> int:
-    """Gather, build; return MkDocs' exit code."""
+    """Gather, run, build; return the exit code."""
     python = _environment()
     shutil.rmtree(PAGES, ignore_errors=True)
     tracked = subprocess.run(
@@ -39,6 +43,12 @@ def main() -> int:
             target = PAGES / name
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(source, target)
+    notebooks = Path(__file__).with_name("notebooks.py")
+    examples = "host/examples"
+    run = [python, str(notebooks), str(ROOT / examples), str(PAGES / examples), str(HOST_PYTHON)]
+    if code := subprocess.run(run, check=False).returncode:
+        return code
+    (PAGES / "site.css").write_text(CSS, encoding="utf-8")
     (PAGES / "API.md").write_text(api_page(), encoding="utf-8")
     (OUT / "mkdocs.yml").write_text(json.dumps(_settings(), indent=1), encoding="utf-8")
     command = [python, "-m", "mkdocs", "build", "--quiet", "--clean", "-f", str(OUT / "mkdocs.yml")]
@@ -104,10 +114,12 @@ def _settings() -> dict[str, object]:
         "site_dir": str(SITE),
         "use_directory_urls": False,  # opened from the disk
         "theme": {"name": "readthedocs", "highlightjs": False},
+        "extra_css": ["site.css"],
         "plugins": ["search", {"mkdocstrings": {"handlers": {"python": python}}}],
         "nav": [
             *(page for page in USERS if (PAGES / page).is_file()),
             "API.md",
+            {"Notebooks": _below("host/examples")},
             {"Hardware": _below("hw")},
             {"Protocol": _below("protocol")},
             {"Studies": _below("host/studies")},

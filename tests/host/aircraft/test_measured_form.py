@@ -44,9 +44,9 @@ def test_options_give_the_file_that_identify_takes(capsys: pytest.CaptureFixture
     assert tuple(measured.vectors["sensors.vane_b_m"]) == (0.18, 0.6, 0.0)
     assert main(["aircraft", "check", "mine.toml"]) == 0
     out = capsys.readouterr().out
-    assert "1.793 kg, span 1.264 m" in out and "preflight and simulate want aerodynamics" in out
+    assert "1.793 kg, span 1.264 m" in out and "plan and simulate want aerodynamics" in out
     assert main(["aircraft", "check", "kadetlt40"]) == 0
-    assert "good for host identify, plan, preflight" in capsys.readouterr().out
+    assert "good for host identify, preflight and live, plan" in capsys.readouterr().out
 
 
 def test_a_terminal_is_asked_for_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:

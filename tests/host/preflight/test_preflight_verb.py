@@ -7,7 +7,11 @@ from pathlib import Path
 import pytest
 from host.cli import main
 from host.log.capture_head import notes_path
+from host.physical.calibration import load_calibration
+from host.preflight.check_list import CheckListInputs, check_list, checked_aircraft
 from host.preflight.preflight_sheet import read_sheet, sheet_beside, sheet_lines
+
+from tests.host.logs import ROOT
 
 
 def notes_of(folder: Path) -> list[dict[str, object]]:
@@ -49,6 +53,23 @@ def test_a_fault_is_no_go_with_exit_code_6_and_its_reason(
     assert any("against its stick" in why for why in read_sheet(sheet).reasons.values())
     assert "--  relay         left out: listen only" in sheet_lines(sheet.read_text())
     assert "relay" not in tomllib.loads(sheet.read_text())["item"]
+
+
+def test_a_measured_aircraft_is_walked_round(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It was refused for its aerodynamics, of which no check asks anything."""
+    monkeypatch.chdir(tmp_path)
+    mine = (ROOT / "host/examples/mine.toml").read_text(encoding="utf-8")
+    Path("mine.toml").write_text(mine, encoding="utf-8")
+    walked = ["preflight", "sim:walk@max", "--no-page", "--aircraft", "mine.toml"]
+    assert main(walked) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "GO"
+    limits = "".join(f"{name}_limit_rad = 0.4\n" for name in ("elevator", "aileron", "rudder"))
+    more = f'{mine}\n[surfaces]\n{limits}source = "protractor"\n'
+    Path("mine.toml").write_text(more, encoding="utf-8")
+    assert check_list(CheckListInputs(checked_aircraft("mine.toml"), load_calibration(None)))
+    assert checked_aircraft("mine.toml").scalar("surfaces.rudder_limit_rad") == 0.4
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,8 @@ from host.errors import UsageError
 from host.files import toml_reader
 
 FOLDER = Path(__file__).parent / "airframes"
+# Of a trainer, to be copied: the handbook makes an aircraft of sizes.
+SIZES = FOLDER.with_name("dimensions") / "kadetlt40.toml"
 
 _SCALARS: Mapping[str, tuple[str, ...]] = {
     "mass": (
@@ -202,9 +204,9 @@ def load(source: str | Path) -> Aircraft:
     kind = document.get("kind")
     if kind == "measured":
         raise AircraftError(
-            f"{source}: a measured aircraft has no aerodynamics; expected one of kind 'nonlinear',"
-            " a file of its dimensions (as host/aircraft/dimensions/kadetlt40.toml), or the models"
-            " that host identify LOG --save-model FILE finds"
+            f"{source}: a measured aircraft has no aerodynamics; take a file of its dimensions"
+            f" (copy {SIZES}, put yours in), or, after a flight, the models of host identify LOG"
+            " --save-model FILE"
         )
     if kind != "nonlinear":
         raise AircraftError(f"{source}: kind is {kind!r}, expected 'nonlinear'")

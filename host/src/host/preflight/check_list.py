@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
-from host.aircraft.file import Aircraft
+from host.aircraft.file import Aircraft, load_measured, read_document
+from host.aircraft.linear_aircraft import load
 from host.constants import DEG_PER_RAD
 from host.errors import UsageError
 from host.near_names import like
@@ -56,6 +57,20 @@ class CheckListInputs:
     by_wire: bool = False
 
 
+def checked_aircraft(source: str) -> Aircraft:
+    """Load the aircraft to walk round: a measured one will do.
+
+    Without a section ``surfaces`` its travel is zero, and the way of each surface alone is judged.
+
+    Raises
+    ------
+    AircraftError
+        A number is missing or wrong.
+    """
+    measured = read_document(source).get("kind") == "measured"
+    return load_measured(source) if measured else load(source)
+
+
 def check_list(wanted: CheckListInputs) -> list[Check]:
     """Return the checks in their order.
 
@@ -85,7 +100,7 @@ def check_list(wanted: CheckListInputs) -> list[Check]:
 
 def surface_check(wanted: CheckListInputs, surface: str) -> SurfaceCheck:
     """Return the check of one surface."""
-    limit_rad = wanted.aircraft.scalars.get(f"surfaces.{surface}_limit_rad")
+    limit_rad = wanted.aircraft.scalars.get(f"surfaces.{surface}_limit_rad") or None
     slope = wanted.calibration.lines[f"pulse.{surface}"].slope[0]
     limit_deg = None if limit_rad is None else limit_rad * DEG_PER_RAD
     return SurfaceCheck(surface, limit_deg, slope, pots="pots" not in wanted.without)

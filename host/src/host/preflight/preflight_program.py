@@ -10,7 +10,6 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from host.aircraft.linear_aircraft import load
 from host.export.toml import dumps
 from host.link.serial import BAUD
 from host.live.live_program import LiveSummary, run_live
@@ -18,7 +17,7 @@ from host.live.live_request import LiveRequest
 from host.live.live_session import LiveSession
 from host.physical.calibration import Calibration
 from host.preflight.check import Check, State
-from host.preflight.check_list import CheckListInputs, left_out
+from host.preflight.check_list import CheckListInputs, checked_aircraft, left_out
 from host.preflight.guided_list import Preflight
 from host.preflight.preflight_screen import PreflightScreen
 from host.preflight.preflight_sheet import SUFFIX, sheet_document, write_sheet
@@ -87,7 +86,7 @@ def run_preflight(
         In one line.
     """
     left_out(request.without)
-    aircraft = load(request.aircraft)
+    aircraft = checked_aircraft(request.aircraft)
     live = request.live
     if live.source is not None and live.source.startswith(SIMULATED):
         from host.preflight.walk_source import walk_source

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from host.aircraft.file import Aircraft
+from host.aircraft.file import Aircraft, load
 from host.errors import UsageError
 from host.live.live_sources import SPEED, Tell, silence
 from host.near_names import like
@@ -17,6 +17,7 @@ from host.twin.ground.ground_walk import STEP_S, ground_walk
 from host.twin.outcome.virtual_calibration import calibration
 
 WALK = "sim:walk"
+USUAL = "ultrastick25e"
 
 
 @dataclass(slots=True)
@@ -87,4 +88,14 @@ def walk_source(text: str, aircraft: Aircraft, seed: int) -> WalkSource:
         raise UsageError(
             f"{text}: no such fault{like(fault, GROUND_FAULTS)}; known: {', '.join(GROUND_FAULTS)}"
         )
-    return WalkSource(aircraft, fault, seed, speed)
+    return WalkSource(_with_travel(aircraft), fault, seed, speed)
+
+
+def _with_travel(aircraft: Aircraft) -> Aircraft:
+    """Give surfaces whose travel nobody measured that of the usual virtual aircraft."""
+    usual = {
+        name: value
+        for name, value in load(USUAL).scalars.items()
+        if name.startswith("surfaces.") and not aircraft.scalars.get(name)
+    }
+    return replace(aircraft, scalars={**aircraft.scalars, **usual})

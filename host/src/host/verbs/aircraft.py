@@ -81,6 +81,6 @@ def _checked(source: str) -> int:
     print(f"{found.title}: {numbers['mass.mass_kg']:g} kg, span {numbers['geometry.span_m']:g} m")
     for doubt in found.doubts:
         print(f"look again: {doubt}")
-    less = ": plan, preflight and simulate want aerodynamics, or a file of sizes (START.md, step 8)"
-    print("good for host identify" + (less if measured else ", plan, preflight and live"))
+    less = "; plan and simulate want aerodynamics, or a file of sizes (START.md, step 8)"
+    print("good for host identify, preflight and live" + (less if measured else ", plan, simulate"))
     return int(ExitCode.OK)

@@ -107,12 +107,12 @@ def _list(args: argparse.Namespace, aircraft: str, without: dict[str, str]) -> i
     """Print the list of checks."""
     import json
 
-    from host.aircraft.linear_aircraft import load
     from host.errors import ExitCode
     from host.physical.calibration import load_calibration
-    from host.preflight.check_list import CheckListInputs, check_list
+    from host.preflight.check_list import CheckListInputs, check_list, checked_aircraft
 
-    wanted = CheckListInputs(load(aircraft), load_calibration(args.calibration), without=without)
+    plane, lines = checked_aircraft(aircraft), load_calibration(args.calibration)
+    wanted = CheckListInputs(plane, lines, without=without)
     checks = check_list(wanted)
     if args.json:
         print(json.dumps([{"item": c.key, "title": c.title, "step": c.step} for c in checks]))
