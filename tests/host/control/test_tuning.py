@@ -25,10 +25,11 @@ from host.control.lateral_pair import PairProblem
 from host.control.loop_design import Design, design, feed_forward, search
 from host.control.outer_loops import OuterCheck
 from host.control.parameter_file import Change, taken_back
-from host.control.scenarios import Problem, draw
+from host.control.scenarios import Problem, draw, scenarios_of
 from host.control.tuning import Tuning
 from host.control.uncertain_axis import UncertainAxis
 from host.control.verification import Required, control_margins, verify
+from host.control.worst_aircraft import worst_on_contour
 from host.control.yaw_design import PairMargins, YawDesign
 from host.sysid.models import Trim
 
@@ -284,6 +285,40 @@ def test_the_control_power_of_a_roll_axis_costs_what_its_interval_says() -> None
     assert name == "L_da"
     # The loop's gain is L_da: of sixty draws the largest lies 2.3 standard deviations up.
     assert 0.3 < share < 0.6
+
+
+def test_the_worst_aircraft_of_the_contour_is_found_where_it_is_known() -> None:
+    # One derivative is open: the contour is its own 95 % interval, and more L_da is more gain.
+    asked = problem(0.0)
+    axis = replace(asked.axis, covariance=np.diag([0.0, (0.1 * 150.0) ** 2]))
+    gains = asked.structure.completed({"P": 0.25, "D": 0.0, "TC": 0.5}, 0.17)
+    worst = worst_on_contour(replace(asked, axis=axis), gains)
+    assert worst is not None
+    assert worst.moved[0][0] == "L_da"
+    assert worst.moved[0][1] == pytest.approx(0.196, abs=1e-3)
+    assert "at L_da +20 %, L_p +0 %" in worst.line
+    known = replace(asked, axis=replace(axis, mean=np.array([-10.0, 150.0 * 1.196]),
+                                        covariance=np.zeros((2, 2))))  # fmt: skip
+    exact = replace(known, actuator=replace(DRIVE, travel_share=0.0, bandwidth_share=0.0,
+                                            delay_sd_s=0.0))  # fmt: skip
+    inner, _ = draw(exact, seed=1, count=1).judged(gains)
+    assert worst.gain_db == pytest.approx(float(inner.gain_db[0]), abs=0.01)
+    assert worst_on_contour(known, gains) is None
+
+
+def test_no_aircraft_drawn_on_the_contour_is_worse() -> None:
+    asked = problem(0.15)
+    gains = asked.structure.completed({"P": 0.12, "D": 0.002, "TC": 0.5}, 0.17)
+    worst = worst_on_contour(asked, gains)
+    assert worst is not None
+    turns = np.linspace(0.0, 2.0 * np.pi, 90)
+    sphere = np.column_stack([np.cos(turns), np.sin(turns)]) * np.sqrt(5.991)  # of two, 95 %
+    drawn = asked.axis.mean + sphere * np.sqrt(np.diag(asked.axis.covariance))
+    drives = np.repeat([[DRIVE.travel_rad, DRIVE.bandwidth_hz, DRIVE.delay_s]], 90, axis=0)
+    inner, outer = scenarios_of(asked, drawn, drives).judged(gains)
+    least = min(float(np.min(one.gain_db)) / 6.0 for one in (inner, outer))
+    least = min(least, *(float(np.min(one.phase_deg)) / 45.0 for one in (inner, outer)))
+    assert min(worst.gain_db / 6.0, worst.phase_deg / 45.0) == pytest.approx(least, rel=0.01)
 
 
 def test_elevons_have_half_the_travel_and_twice_the_gains() -> None:

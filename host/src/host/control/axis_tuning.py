@@ -10,6 +10,7 @@ from host.control.lateral_pair import PairProblem
 from host.control.loop_design import Design
 from host.control.parameter_file import Change
 from host.control.scenarios import Problem
+from host.control.worst_aircraft import WorstAircraft
 from host.control.yaw_design import YawDesign
 
 
@@ -21,6 +22,7 @@ class AxisTuning:
     design: Design
     before: Mapping[str, float]
     costs: tuple[tuple[str, float], ...] = ()
+    worst: WorstAircraft | None = None
 
     @property
     def axis(self) -> str:

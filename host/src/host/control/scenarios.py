@@ -209,7 +209,20 @@ def draw(problem: Problem, *, seed: int, count: int) -> Scenarios:
     count : int
     """
     rng = np.random.default_rng([seed, 48])
-    values, drives = problem.axis.drawn(rng, count), problem.actuator.drawn(rng, count)
+    return scenarios_of(problem, problem.axis.drawn(rng, count), problem.actuator.drawn(rng, count))
+
+
+def scenarios_of(problem: Problem, values: Array, drives: Array) -> Scenarios:
+    """Return named aircraft at each airspeed.
+
+    Parameters
+    ----------
+    problem : Problem
+    values : Array, shape (N, P)
+        Derivatives at the airspeed of the trim.
+    drives : Array, shape (N, 3)
+        Travel (rad), bandwidth (Hz) and delay (s).
+    """
     period = problem.period_s
     w = np.geomspace(SLOWEST_RADPS, 0.98 * np.pi / period, POINTS)
     rows = tuple(

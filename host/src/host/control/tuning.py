@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from host.aircraft.file import load_measured
-from host.constants import NORMAL_95
 from host.control.actuator import Actuator, actuator_of
 from host.control.autopilots.known import AUTOPILOTS, Autopilot, Rudder
 from host.control.axis_tuning import AxisTuning, YawTuning, changes_of
@@ -26,8 +25,10 @@ from host.control.outer_loops import OuterCheck, check
 from host.control.parameter_file import Change, taken_back
 from host.control.plant import RATES
 from host.control.scenarios import Problem
+from host.control.tuning_notes import tuning_notes
 from host.control.uncertain_axis import UncertainAxis, axes_of, axes_of_models
 from host.control.verification import UNSEEN, Required
+from host.control.worst_aircraft import worst_on_contour
 from host.control.yaw_design import PairMargins, design_yaw
 from host.export.pictures import Pictures
 
@@ -246,16 +247,24 @@ def tune(
         before = logged if chosen.words else usual
         found.append(AxisTuning(problem, design(problem, seed=seed), before))
     flown = () if isinstance(source, Sequence) else _airspeeds_mps(source)
-    notes = list(_notes(found, chosen, logged, flown))
+    notes = list(tuning_notes(found, chosen, logged, flown))
     yaw = None
     try:
         found, yaw = with_rudder(chosen, aircraft, found, seed)
     except ControlError as error:
         notes.append(f"no yaw damper: {error}")
-    found = [replace(one, costs=tuple(bandwidth_costs(one.problem, one.design.gains)))
-             if one.design.gains else one for one in found]  # fmt: skip
+    found = [_explained(one) for one in found]
     outer = tuple(_around(chosen, found, logged, seed))
     return Tuning(chosen, loaded.name, tuple(found), tuple(notes), dated.isoformat(), yaw, outer)
+
+
+def _explained(one: AxisTuning) -> AxisTuning:
+    """Return an axis with what its derivatives cost, and its worst aircraft."""
+    problem, gains = one.problem, one.design.gains
+    if gains is None:
+        return one
+    costs = tuple(bandwidth_costs(problem, gains))
+    return replace(one, costs=costs, worst=worst_on_contour(problem, gains))
 
 
 def _around(
@@ -330,48 +339,6 @@ def _airspeeds_mps(identified: Identification) -> tuple[float, ...]:
     return (min(flown), max(flown)) if flown else ()
 
 
-def _notes(
-    axes: Sequence[AxisTuning],
-    chosen: Autopilot,
-    logged: Mapping[str, float],
-    flown_mps: Sequence[float],
-) -> Iterator[str]:
-    for missing in {"roll", "pitch"} - {one.axis for one in axes}:
-        yield f"no gains for {missing}: the answer has no model of it"
-    if any(not one.problem.axis.correlated for one in axes):
-        yield "a saved model has no correlations: its derivatives are drawn independently"
-    settings = [s for one in axes for s in one.problem.structure.settings.values()]
-    own = [s for s in settings if s.name in logged]
-    told = tuple(dict.fromkeys(name for one in axes for name in one.problem.structure.assumed))
-    if not own and chosen.words:
-        yield (
-            "nobody named the old gains: name the autopilot's parameters with --parameters, or a"
-            " log that has them"
-        )
-    if told:
-        yield f"defaults stand for {', '.join(told)}"
-    if logged.get("tpa_rate", 0.0) > 0.0 and chosen.name == "inav":
-        yield "tpa_rate makes gains follow the throttle, which no aircraft here does: set it to 0"
-    for one in own:
-        value = logged[one.name]
-        if value != one.default and not one.lowest <= value <= one.highest:
-            yield f"{one.name} is {value:g}, documented {one.lowest:g} to {one.highest:g}"
-    speeds = sorted({v for one in axes for v in one.problem.airspeeds_mps})
-    beyond = [f"{v:.1f}" for v in speeds if flown_mps and not flown_mps[0] <= v <= flown_mps[-1]]
-    if beyond:
-        yield (
-            f"not flown at {', '.join(beyond)} m/s: derivatives of {flown_mps[0]:.1f} to"
-            f" {flown_mps[-1]:.1f} m/s are scaled with the airspeed"
-        )
-    for one_axis in axes:
-        drive = one_axis.problem.actuator
-        if not drive.servo_known:
-            yield (
-                f"the {drive.surface}'s servo is not in the aircraft file: {drive.bandwidth_hz:.1f}"
-                f" Hz +- {100.0 * NORMAL_95 * drive.bandwidth_share:.0f} % stand for it"
-            )
-
-
 def _worst_of_pair(found: PairMargins) -> Iterator[tuple[str, float]]:
     for name, (gain_db, phase_deg) in (("aileron", found.aileron), ("rudder", found.rudder)):
         yield f"{name}_gain_db", gain_db
@@ -387,6 +354,9 @@ def _worst(one: AxisTuning) -> Iterator[tuple[str, float]]:
         yield f"{name}_gain_db", float(loop.gain_db.min())
         yield f"{name}_phase_deg", float(loop.phase_deg.min())
         yield f"{name}_disk", float(loop.disk.min())
+    if one.worst is not None:
+        yield "contour_gain_db", one.worst.gain_db
+        yield "contour_phase_deg", one.worst.phase_deg
     yield "crossover_least_radps", found.crossover_radps[0]
     yield "crossover_median_radps", found.crossover_radps[1]
     yield "surface_rate_radps", found.surface_rate_radps

@@ -71,6 +71,8 @@ def _axis_lines(one: AxisTuning) -> Iterator[str]:
             f"  {name + ' loop:':22s} at least {loop.gain_db.min():.1f} dB,"
             f" {loop.phase_deg.min():.0f} deg, disk {loop.disk.min():.2f}"
         )
+    if one.worst is not None:
+        yield f"  {one.worst.line}"
     low, middle, _ = proven.crossover_radps
     yield f"  crossover {middle:.1f} rad/s, slowest aircraft {low:.1f}"
     if one.costs:
