@@ -1,6 +1,6 @@
 # Two commands: `make demo` and `make test`. Both set up what they need first.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test native mega sitl lint format bench study judgement tune-bench fleet-bench live-bench flight-bench imu-bench faults power-cuts card-images fuzz mutants hw clean docs release input-flights ideas ground-triggers
+.PHONY: help setup demo test native mega sitl lint format bench study judgement tune-bench fleet-bench live-bench flight-bench imu-bench faults power-cuts card-images fuzz mutants hw clean docs release input-flights ideas ground-triggers hold-flights
 PYTHON := .venv/bin/python
 PIO := .venv/bin/pio
 # Runs a module of tests/chip in that folder; what it imports lies elsewhere.
@@ -94,6 +94,9 @@ card-images: setup sitl ## 10 000 cards altered at random, under sanitizers, and
 
 input-flights: setup sitl ## 1000 random flights with a flight card, a fault at any instant of an input (minutes)
 	@$(PYTHON) tests/sitl/input_faults.py $(INPUTS)
+
+hold-flights: setup sitl ## 2000 random flights whose rows hold bank and pitch, 100 more of each fault (an hour)
+	@$(PYTHON) tests/sitl/hold_faults.py $(HOLDS)
 
 ground-triggers: setup sitl ## 10 200 triggers on the ground, none starts a row, and 5400 honest ones; the image on the chip
 	@$(PYTHON) tests/sitl/ground_triggers.py $(GROUND); bad=$$?; cd tests/chip && $(CHIP_PYTHON) -m flight.ground_triggers $(CHIP_GROUND) && exit $$bad

@@ -21,7 +21,7 @@ bool hash_holds(const CardHead& head) {
   core::Crc32 crc;
   crc.add(&head, core::kCardFieldsBytes);
   const uint8_t parts = static_cast<uint8_t>(frames::kCardHeadParts - 2U + head.rows +
-                                             frames::kCardAxisParts * head.learned_axes);
+                                             frames::kCardAxisParts * head.learned_axes + head.hold);
   add_bytes(&crc, card_part_address(2), static_cast<uint16_t>(parts * frames::kCardPartBytes));
   return head.crc != 0 && crc.value() == head.crc;
 }
@@ -35,7 +35,7 @@ __attribute__((noinline)) CardFault judge_card_head(const char* aircraft, core::
     return fault;
   }
   // More axes than a card has room for: their bytes would be read from behind the EEPROM.
-  if (head.learned_axes > frames::kCardMostAxes) return CardFault::kLimits;
+  if (head.learned_axes > frames::kCardMostAxes || head.hold > 1) return CardFault::kLimits;
   if (!hash_holds(head)) return CardFault::kCrc;
   *limits = core::row_limits(head);
   return fault;
@@ -61,9 +61,25 @@ __attribute__((noinline)) bool learned_worth_good(uint8_t n) {
   return core::worth_good(worth);
 }
 
+uint8_t card_u8(uint16_t offset) {
+  uint8_t value;
+  read_card(offset, &value, sizeof value);
+  return value;
+}
+
+bool card_row_holds(uint8_t row) {
+  const uint16_t part = static_cast<uint16_t>(frames::kCardHeadParts + row);
+  return card_u8(static_cast<uint16_t>(part * frames::kCardPartBytes + offsetof(CardRow, axes))) >>
+             frames::kCardHeldShift !=
+         0;
+}
+
 __attribute__((noinline)) bool learning_good(uint8_t rows, uint8_t axes) {
   for (uint8_t row = 0; row < rows; ++row) {
-    if (!core::axis_of_row_good(card_axis_of_row(row), axes)) return false;
+    const uint8_t learned = card_axis_of_row(row);
+    if (!core::axis_of_row_good(learned, axes)) return false;
+    // One memory for both.
+    if (learned != 0 && card_row_holds(row)) return false;
   }
   for (uint8_t n = 1; n <= axes; ++n) {
     if (!learned_axis_good(n) || !learned_worth_good(n)) return false;
@@ -71,10 +87,12 @@ __attribute__((noinline)) bool learning_good(uint8_t rows, uint8_t axes) {
   return true;
 }
 
-uint8_t card_u8(uint16_t offset) {
-  uint8_t value;
-  read_card(offset, &value, sizeof value);
-  return value;
+__attribute__((noinline)) bool hold_part_good(uint8_t part) {
+  uint16_t amplitude_max_us[core::kCardAxes];
+  read_card(offsetof(CardHead, amplitude_max_us), amplitude_max_us, sizeof amplitude_max_us);
+  frames::CardHoldLayout hold;
+  read_card_part(part, reinterpret_cast<uint8_t*>(&hold));
+  return core::hold_good(hold, amplitude_max_us);
 }
 
 }  // namespace
@@ -102,7 +120,9 @@ CardFault judge_card(const char* aircraft) {
     if (fault != CardFault::kNone) return fault;
   }
   const uint8_t axes = card_u8(offsetof(CardHead, learned_axes));
-  return learning_good(card_rows(), axes) ? CardFault::kNone : CardFault::kLearning;
+  if (!learning_good(card_rows(), axes)) return CardFault::kLearning;
+  const uint8_t hold = card_hold_part();
+  return hold == 0 || hold_part_good(hold) ? CardFault::kNone : CardFault::kHold;
 }
 
 bool card_marked_valid() {
@@ -125,7 +145,14 @@ uint8_t card_axis_part(uint8_t n) {
 }
 
 uint8_t card_parts() {
-  return card_axis_part(static_cast<uint8_t>(card_u8(offsetof(CardHead, learned_axes)) + 1U));
+  const uint8_t axes = card_u8(offsetof(CardHead, learned_axes));
+  return static_cast<uint8_t>(card_axis_part(static_cast<uint8_t>(axes + 1U)) +
+                              card_u8(offsetof(CardHead, hold)));
+}
+
+uint8_t card_hold_part() {
+  if (card_u8(offsetof(CardHead, hold)) == 0) return 0;
+  return static_cast<uint8_t>(card_parts() - 1U);
 }
 
 uint8_t card_axis_of_row(uint8_t row) {

@@ -32,6 +32,8 @@ bool card_marked_valid();
 uint32_t card_hash();
 uint8_t card_rows();
 uint8_t card_parts();  // all of them
+// Part card_hold: the last; 0: the card has none.
+uint8_t card_hold_part();
 // The part of the nth axis that is learned, n from 1; behind it stands what it is worth.
 uint8_t card_axis_part(uint8_t n);
 // n of a row; 0: nothing is learned while it is flown.

@@ -5,18 +5,28 @@
 #include <stdint.h>
 
 #include "app/row_learning.h"
+#include "core/attitude_hold.h"
 #include "core/input_watch.h"
 
 namespace app {
 
 struct RowMemory {
+  // All of it cleared.
+  RowMemory()
+      : watch(), least_ticks(), most_ticks(), learning(), judged(), told(false), holds(false) {}
+
   core::InputWatch watch;
   // Of the pulses, in ticks of 0.5 us: the card's travel and the one shown, whichever is less.
   uint16_t least_ticks[core::kCardAxes];
   uint16_t most_ticks[core::kCardAxes];
-  RowLearning learning;
+  // A row that holds teaches nothing.
+  union {
+    RowLearning learning;
+    core::AttitudeHold hold;
+  };
   frames::CardFault judged;  // the row, since memory was lent
   bool told;                 // that it began
+  bool holds;                // the row, once it is judged
 };
 
 }  // namespace app

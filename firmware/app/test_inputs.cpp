@@ -27,6 +27,7 @@ constexpr uint16_t kWatchUs = 5000;    // ages grow without any news
 // with a long turn of the main loop two looks are 8 ms apart. So each looks ahead.
 constexpr uint16_t kAheadUs = 3000;
 constexpr uint8_t kPaShift = 4;
+constexpr int16_t kTilt = 1500;  // 15 deg: what no one takes for level
 constexpr uint8_t kEnabledBeeps = 3;
 constexpr uint8_t kConfigFrames = 1;  // of the card's frames, before its parts
 
@@ -89,7 +90,11 @@ void TestInputs::look(const Pilot& pilot,
   facts.place = core::switch_place(
       channels.width_ticks[core::kSwitch], config.switch_mega_min_us, armed_min_us_);
   if (!command_.running()) {
-    if (!command_.trigger(facts.place, pilot.drive == frames::Drive::kMega, now_us)) return;
+    const bool armed = command_.armed();
+    if (!command_.trigger(facts.place, pilot.drive == frames::Drive::kMega, now_us)) {
+      if (!armed && command_.armed() && holds()) memory_->hold.arm(channels);
+      return;
+    }
   }
   facts.frame_us = pilot.decoder->frame_us();
   facts.silent_us = pilot.silent_us;
@@ -126,6 +131,11 @@ __attribute__((noinline)) void TestInputs::begin(InputMemory* memory,
   if (why == InputEnd::kDone && !facts.contact) why = InputEnd::kRelay;
   if (why == InputEnd::kDone) why = memory_->watch.outside();
   if (why == InputEnd::kDone && !travel_.shown()) why = InputEnd::kTravel;
+  if (why == InputEnd::kDone && memory_->holds) {
+    const uint8_t held = core::held_axes(memory->row);
+    if ((senses_ & held) != held) why = InputEnd::kHoldSense;
+    if (!memory_->hold.sticks_still(*facts.rc, facts.stick_us)) why = InputEnd::kStick;
+  }
   // Its memory may have been the events' since it was judged.
   if (why == InputEnd::kDone &&
       (memory_->judged != CardFault::kNone || !core::row_whole(memory->row))) {
@@ -140,7 +150,11 @@ __attribute__((noinline)) void TestInputs::begin(InputMemory* memory,
   }
   memory->rate_max_usps = card_u16(offsetof(CardHead, rate_max_usps));
   command_.start(*memory, facts, now_us);
-  memory_->learning.start(row, rate_hz);
+  if (memory_->holds) {
+    memory_->hold.start(now_us);
+  } else {
+    memory_->learning.start(row, rate_hz);
+  }
   memory->t_us = now_us;
   memory->part = static_cast<uint8_t>(frames::kCardHeadParts + row);
   memory_->told = false;
@@ -164,6 +178,7 @@ void TestInputs::lend(RowMemory* memory, Outlet& outlet, uint32_t now_us) {
   read_card(core::kInputLimitsOffset, &watch.limits, sizeof watch.limits);
   watch.start(now_us);
   memory->learning.stop();
+  memory->holds = false;
   memory->judged = CardFault::kNotValid;
   bound_pulses();
 }
@@ -178,9 +193,24 @@ __attribute__((noinline)) bool TestInputs::judge(Outlet& outlet) {
         card_u16(static_cast<uint16_t>(offsetof(CardHead, amplitude_max_us) + 2U * axis));
   }
   limits.frequency_max_chz = card_u16(offsetof(CardHead, frequency_max_chz));
+  const uint8_t hold = card_hold_part();
+  limits.hold = hold != 0;
   read_card_row(command_.row(), &memory->row);
   memory_->judged = core::judge_row(memory->row, limits);
+  if (memory_->judged == CardFault::kNone && core::held_axes(memory->row) != 0) {
+    load_hold(hold, core::held_axes(memory->row), outlet);
+  }
   return true;
+}
+
+// What the row holds takes the memory of what it would teach.
+__attribute__((noinline)) void TestInputs::load_hold(uint8_t part, uint8_t held, Outlet& outlet) {
+  outlet.teach(nullptr);
+  frames::CardHoldLayout card;
+  read_card_part(part, reinterpret_cast<uint8_t*>(&card));
+  memory_->hold.load(card, held, card_u16(offsetof(CardHead, rate_max_usps)));
+  memory_->holds = true;
+  memory_->watch.found[core::InputWatch::kHold] = InputEnd::kSensorLost;
 }
 
 bool TestInputs::watch_sensors(const Sensors& sensors, Outlet& outlet, uint32_t turn_us) {
@@ -192,7 +222,7 @@ bool TestInputs::watch_sensors(const Sensors& sensors, Outlet& outlet, uint32_t 
   core::InputWatch& watch = memory_->watch;
   if (!news(sensors, watch, turn_us)) return false;
   const uint32_t now_us = hal::now_us();
-  see(sensors, watch, now_us);
+  see(sensors, *outlet.lend(), now_us);
   if (!command_.running()) return false;
   InputEnd why = watch.outside();
   if (why == InputEnd::kDone && !flying_.holds()) why = InputEnd::kNotFlying;
@@ -213,8 +243,9 @@ bool TestInputs::news(const Sensors& sensors,
 
 // Each sensor is looked at on its own news, so that what comes seldom costs little; that one ceased
 // is seen with each scan, and each 5 ms where none comes.
-void TestInputs::see(const Sensors& sensors, core::InputWatch& watch, uint32_t now_us) {
+void TestInputs::see(const Sensors& sensors, InputMemory& memory, uint32_t now_us) {
   using core::InputWatch;
+  InputWatch& watch = memory_->watch;
   core::InputReadings in;
   const uint8_t imu = sensors.imu().seq;
   if (imu != watch.imu) {
@@ -222,6 +253,11 @@ void TestInputs::see(const Sensors& sensors, core::InputWatch& watch, uint32_t n
     sensors.imu_readings(&in);
     watch.motion.see_imu(in, now_us);
     watch.found[InputWatch::kImu] = core::judge_imu(watch.limits, in);
+    if (memory_->holds) {
+      watch.found[InputWatch::kHold] =
+          command_.running() ? memory_->hold.step(in, memory.applied_ticks, now_us)
+                             : memory_->hold.may_start(in);
+    }
   }
   const uint16_t baro_us = static_cast<uint16_t>(sensors.baro().t_us);
   if (baro_us != watch.baro_us) {
@@ -319,13 +355,51 @@ void TestInputs::step_slow(const PilotLink& pilot,
   }
   if (flight != core::FlightState::kGround) return;
   travel_.look(rc);
-  const bool sign =
-      !command_.enabled() && hash_shown_ && rc.steady == (1U << core::kChannels) - 1U &&
+  const bool resting =
+      rc.steady == (1U << core::kChannels) - 1U &&
       rc.width_ticks[core::kSwitch] <= config.switch_direct_max_us * core::kTicksPerUs &&
       rc.width_ticks[core::kThrottle] <= config.throttle_idle_max_us * core::kTicksPerUs &&
-      travel_.shown() && travel_.at_end(core::kAileron, rc.width_ticks[core::kAileron]) &&
-      travel_.at_end(core::kRudder, rc.width_ticks[core::kRudder]);
+      travel_.shown();
+  const bool aileron = travel_.at_end(core::kAileron, rc.width_ticks[core::kAileron]);
+  if (command_.enabled()) {
+    const uint8_t axis = aileron ? core::kAileron : core::kElevator;
+    const bool shown = resting && tilted(axis, rc, sensors);
+    if (sign_.look(shown, now_us)) prove(axis, rc, outlet, now_us);
+    return;
+  }
+  const bool sign = resting && hash_shown_ && aileron &&
+                    travel_.at_end(core::kRudder, rc.width_ticks[core::kRudder]);
   if (sign_.look(sign, now_us)) enable(sensors, outlet, now_us);
+}
+
+// Right wing down with the aileron at its end, or nose up with the elevator at its end: the stick
+// that a pilot gives against it.
+bool TestInputs::tilted(uint8_t axis, const core::RcChannels& rc, const Sensors& sensors) const {
+  if (!travel_.at_end(axis, rc.width_ticks[axis]) || card_hold_part() == 0) return false;
+  core::InputReadings in;
+  sensors.imu_readings(&in);
+  return in.imu && (axis == core::kAileron ? in.phi : in.theta) >= kTilt;
+}
+
+// What the stick did is what the card's gain must do; else the card is refused.
+__attribute__((noinline)) void TestInputs::prove(uint8_t axis,
+                                                 const core::RcChannels& rc,
+                                                 Outlet& outlet,
+                                                 uint32_t now_us) {
+  const uint16_t at = static_cast<uint16_t>(card_hold_part() * frames::kCardPartBytes);
+  const size_t field = offsetof(frames::CardHoldLayout, angle_gain);
+  const int16_t gain =
+      static_cast<int16_t>(card_u16(static_cast<uint16_t>(at + field + 2U * axis)));
+  const bool raises = !travel_.above_middle(axis, rc.width_ticks[axis]);
+  outlet.event(Event::kHoldSense, axis | static_cast<uint32_t>(raises) << 8, now_us);
+  if (raises == (gain > 0)) {
+    senses_ = static_cast<uint8_t>(senses_ | 1U << axis);
+    beeps_ = kEnabledBeeps;
+    return;
+  }
+  command_.disable();
+  beeps_ = beeps_of(InputEnd::kHoldSense);
+  outlet.event(Event::kCardRefused, static_cast<uint32_t>(CardFault::kHold), now_us);
 }
 
 void TestInputs::enable(const Sensors& sensors, Outlet& outlet, uint32_t now_us) {
@@ -345,6 +419,7 @@ void TestInputs::enable(const Sensors& sensors, Outlet& outlet, uint32_t now_us)
   read_card(offsetof(CardHead, airspeed_input), &airspeed_input, sizeof airspeed_input);
   flying_.tare(airspeed_input, card_u16(offsetof(CardHead, dp_min)), in, now_us);
   command_.enable();
+  senses_ = 0;
   told_ = 0;
   beeps_ = kEnabledBeeps;
   outlet.event(Event::kCardEnabled, card_hash(), now_us);

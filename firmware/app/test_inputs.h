@@ -62,7 +62,7 @@ class TestInputs {
     if (memory_ == nullptr) return false;
     if (command_.running()) {
       if (!memory_->told) return tell_start(outlet);
-      if (!memory_->learning.ready()) return false;
+      if (memory_->holds || !memory_->learning.ready()) return false;
       memory_->learning.step(outlet, now_us);
       return true;
     }
@@ -70,7 +70,8 @@ class TestInputs {
   }
   // Of the row that is flown all is known that its card wants.
   bool learned_enough() const {
-    return command_.running() && memory_ != nullptr && memory_->learning.enough();
+    return command_.running() && memory_ != nullptr && !memory_->holds &&
+           memory_->learning.enough();
   }
   // Whether a row may be flown: `lend` is to give memory for it, null where none may.
   bool wants_memory() const { return command_.uses_memory(); }
@@ -114,8 +115,12 @@ class TestInputs {
   bool tell_start(Outlet& outlet);
   bool news(const Sensors& sensors, const core::InputWatch& watch, uint32_t turn_us) const;
   __attribute__((noinline)) void see(const Sensors& sensors,
-                                     core::InputWatch& watch,
+                                     core::InputMemory& memory,
                                      uint32_t now_us);
+  void load_hold(uint8_t part, uint8_t held, Outlet& outlet);
+  bool holds() const { return memory_ != nullptr && memory_->holds; }
+  bool tilted(uint8_t axis, const core::RcChannels& rc, const Sensors& sensors) const;
+  void prove(uint8_t axis, const core::RcChannels& rc, Outlet& outlet, uint32_t now_us);
   void look_for_flight(const Sensors& sensors, uint32_t now_us);
   bool watch_sensors(const Sensors& sensors, Outlet& outlet, uint32_t turn_us);
   void finish(frames::InputEnd why, Outlet& outlet, uint32_t now_us);
@@ -134,6 +139,7 @@ class TestInputs {
   uint8_t rows_ = 0;
   uint8_t told_ = 0;  // frames of the card that this session has
   uint8_t beeps_ = 0;
+  uint8_t senses_ = 0;  // axes that tilt and stick showed to be held the right way round
   bool hash_shown_ = false;
   bool button_spent_ = false;
 };

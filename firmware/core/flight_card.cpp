@@ -60,7 +60,7 @@ bool limits_good(const CardHead& head) {
          within(head.stick_us, 10, 200) && servos_good(head) &&
          within(head.rate_max_usps, 100, 60000U) &&
          within(head.frequency_max_chz, 1, frames::kCardMostFrequencyChz) &&
-         head.learned_axes <= frames::kCardMostAxes && reserved_is_zero(head);
+         head.learned_axes <= frames::kCardMostAxes && head.hold <= 1 && reserved_is_zero(head);
 }
 
 // `parts` of the fastest period in duration_ms: its frequency in 0.01 Hz is 50000 * parts / T.
@@ -114,11 +114,20 @@ CardFault judge_frequency(const CardRow& row, CardShape shape, uint16_t most_chz
                                                        : CardFault::kRowFrequency;
 }
 
+bool same_sense(int16_t gain, int16_t other) {
+  return other == 0 || (gain < 0) == (other < 0);
+}
+
 CardFault judge_axes(const CardRow& row, const RowLimits& limits) {
-  if (row.axes == 0 || row.axes >= 1U << kCardAxes) return CardFault::kRowAxes;
+  const uint8_t moved = moved_axes(row);
+  const uint8_t held = held_axes(row);
+  if (moved == 0 || moved >= 1U << kCardAxes) return CardFault::kRowAxes;
+  if (held >= 1U << kHeldAxes || (held & moved) != 0 || (held != 0 && !limits.hold)) {
+    return CardFault::kRowHold;
+  }
   for (uint8_t axis = 0; axis < kCardAxes; ++axis) {
     const int16_t amplitude_us = row.amplitude_us[axis];
-    if (((row.axes >> axis & 1U) != 0) != (amplitude_us != 0)) return CardFault::kRowAxes;
+    if (((moved >> axis & 1U) != 0) != (amplitude_us != 0)) return CardFault::kRowAxes;
     const int32_t most_us = limits.amplitude_max_us[axis];
     if (amplitude_us > most_us || amplitude_us < -most_us) return CardFault::kRowAmplitude;
   }
@@ -133,6 +142,7 @@ RowLimits row_limits(const CardHead& head) {
     limits.amplitude_max_us[axis] = head.amplitude_max_us[axis];
   }
   limits.frequency_max_chz = head.frequency_max_chz;
+  limits.hold = head.hold != 0;
   return limits;
 }
 
@@ -142,6 +152,21 @@ CardFault judge_head(const CardHead& head, const char* aircraft) {
   if (!within(head.rows, 1, frames::kCardMostRows)) return CardFault::kRows;
   if (memcmp(head.aircraft, aircraft, sizeof head.aircraft) != 0) return CardFault::kAircraft;
   return limits_good(head) ? CardFault::kNone : CardFault::kLimits;
+}
+
+bool hold_good(const frames::CardHoldLayout& card, const uint16_t* amplitude_max_us) {
+  uint8_t bits = 0;
+  for (const uint8_t byte : card.reserved) bits = static_cast<uint8_t>(bits | byte);
+  for (uint8_t axis = 0; axis < kHeldAxes; ++axis) {
+    const int16_t gain = card.angle_gain[axis];
+    // -32768 has no opposite.
+    if (gain == 0 || gain == INT16_MIN || card.rate_gain[axis] == INT16_MIN ||
+        !same_sense(gain, card.integral_gain[axis]) || !same_sense(gain, card.rate_gain[axis]) ||
+        card.authority_us[axis] == 0 || card.authority_us[axis] > amplitude_max_us[axis]) {
+      return false;
+    }
+  }
+  return bits == 0;
 }
 
 bool row_whole(const CardRow& row) {

@@ -14,19 +14,16 @@ constexpr uint16_t kUsPerMs = 1000;
 constexpr uint16_t kRateShare = static_cast<uint16_t>((1ULL << 32U) * kTicksPerUs / 1000000U);
 constexpr uint8_t kFrameShare = 8;  // the frame time may drift by an eighth
 
-uint16_t apart(uint16_t a, uint16_t b) {
-  return a > b ? static_cast<uint16_t>(a - b) : static_cast<uint16_t>(b - a);
+bool all_channels(const RcChannels& rc) {
+  return rc.steady == (1U << kChannels) - 1U;
 }
 
-// At most what the rate allows, less by 0.2 ticks at most.
+}  // namespace
+
 uint16_t ticks_at(uint16_t rate_usps, uint16_t rest_us) {
   const uint32_t way = static_cast<uint32_t>(rate_usps) * rest_us >> 16U;
   return static_cast<uint16_t>(static_cast<uint32_t>(static_cast<uint16_t>(way)) * kRateShare >>
                                16U);
-}
-
-bool all_channels(const RcChannels& rc) {
-  return rc.steady == (1U << kChannels) - 1U;
 }
 
 int16_t towards(int16_t from, int16_t to, uint16_t most) {
@@ -34,8 +31,6 @@ int16_t towards(int16_t from, int16_t to, uint16_t most) {
   if (way > most) return static_cast<int16_t>(from + most);
   return way < -static_cast<int32_t>(most) ? static_cast<int16_t>(from - most) : to;
 }
-
-}  // namespace
 
 SwitchPlace switch_place(uint16_t width_ticks,
                          uint16_t switch_mega_min_us,
@@ -142,6 +137,7 @@ void InputCommand::steer(InputMemory& memory, uint32_t now_us) const {
           static_cast<uint16_t>(memory.elapsed_ms - memory.row.quiet_ms),
           target);
   for (uint8_t axis = 0; axis < kCardAxes; ++axis) {
+    if ((held_axes(memory.row) >> axis & 1U) != 0) continue;  // AttitudeHold's
     memory.applied_ticks[axis] = towards(memory.applied_ticks[axis], target[axis], most);
   }
 }

@@ -77,6 +77,7 @@ class InputCommand {
 
   State state() const { return state_; }
   bool enabled() const { return state_ != State::kOff; }
+  bool armed() const { return state_ == State::kAtArmed; }
   bool running() const { return state_ == State::kRunning; }
   // The memory is in use: from the switch's coming to Mega to the end of the input.
   bool uses_memory() const {
@@ -112,6 +113,13 @@ class InputCommand {
   State state_ = State::kOff;
   uint8_t row_ = 0;
 };
+
+inline uint16_t apart(uint16_t a, uint16_t b) {
+  return a > b ? static_cast<uint16_t>(a - b) : static_cast<uint16_t>(b - a);
+}
+// What a rate allows in a time, less by 0.2 ticks at most.
+uint16_t ticks_at(uint16_t rate_usps, uint16_t rest_us);
+int16_t towards(int16_t from, int16_t to, uint16_t most);
 
 // `base` with a deflection above or below zero added, up or down to a limit; a base beyond it is
 // left where it is. Widths of 0.5 us, deflections of at most 1000: no sum leaves 16 bits.

@@ -185,6 +185,7 @@ InputEnd judge_heard(const InputLimits& limits,
 void InputWatch::start(uint32_t now_us) {
   motion.start(now_us);
   for (InputEnd& part : found) part = InputEnd::kSensorLost;
+  found[kHold] = InputEnd::kDone;
   // Of a GPS that is not there no news ever comes.
   if (limits.distance_max_m == 0) found[kGps] = InputEnd::kDone;
   looked_us = static_cast<uint16_t>(now_us);

@@ -131,7 +131,7 @@ frames::InputEnd judge_heard(const InputLimits& limits,
 
 // What is known of the aircraft while an input may be flown: lent memory (app/row_memory.h).
 struct InputWatch {
-  enum Part : uint8_t { kImu, kScan, kBaro, kGps, kHeard, kParts };
+  enum Part : uint8_t { kImu, kScan, kBaro, kGps, kHeard, kHold, kParts };
 
   InputLimits limits;
   InputMotion motion;
@@ -143,7 +143,7 @@ struct InputWatch {
   uint8_t scan;
   uint8_t imu;
 
-  // Of the limits, which are there, nothing is known yet.
+  // Of the limits, which are there, nothing is known yet. kHold is its row's.
   void start(uint32_t now_us);
   frames::InputEnd outside() const;  // kDone: all limits hold
 };

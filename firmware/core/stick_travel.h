@@ -24,6 +24,9 @@ class StickTravel {
   // Every axis was moved by 200 us or more.
   bool shown() const;
   bool at_end(uint8_t axis, uint16_t width_ticks) const;
+  bool above_middle(uint8_t axis, uint16_t width_ticks) const {
+    return 2U * width_ticks > static_cast<uint32_t>(least_ticks(axis)) + most_ticks(axis);
+  }
 
  private:
   static constexpr uint8_t kStepBits = 4;

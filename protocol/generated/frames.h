@@ -11,7 +11,7 @@
 namespace frames {
 
 constexpr uint8_t kVersion = 1;
-constexpr uint32_t kSchemaHash = 0x2EF5ACBAu;
+constexpr uint32_t kSchemaHash = 0xB9D76C30u;
 constexpr size_t kMaxWireSize = 68;  // longest frame with its id
 
 // Bits of `valid`.
@@ -171,6 +171,8 @@ enum class CardFault : uint8_t {
   kRowComponents = 13,
   kNotValid = 14,
   kLearning = 15,
+  kHold = 16,
+  kRowHold = 17,
 };
 
 enum class InputEnd : uint8_t {
@@ -201,6 +203,9 @@ enum class InputEnd : uint8_t {
   kRowDamaged = 24,
   kTravel = 25,
   kNotFlying = 26,
+  kHoldLoses = 27,
+  kHoldAttitude = 28,
+  kHoldSense = 29,
 };
 
 enum class Derivative : uint8_t {
@@ -257,6 +262,7 @@ enum class Event : uint8_t {
   kInputStart = 35,
   kInputEnd = 36,
   kInputRefused = 37,
+  kHoldSense = 38,
 };
 
 // All identification channels at one instant. A new-type IMU packet triggers it (every n-th at lower rates), or the timer 1.5 periods after the last trigger.
@@ -834,7 +840,7 @@ static_assert(offsetof(OriginalImu2Packet, satellites) == 28, "offset of Origina
 // Whose card it is, and what an input may do. A value on a limit is inside.
 struct __attribute__((packed)) CardHeadLayout {
   uint16_t magic;  // FC
-  uint8_t version;
+  uint8_t version;  // 1: a card that holds nothing; what `hold` is was 0
   uint8_t rows;  // 1 to 32
   char aircraft[16];  // must be config.aircraft of the logger
   uint8_t airspeed_input;  // bit of ident.valid of the pitot that is watched: 4 dp_a, 5 dp_b; 255: none
@@ -866,12 +872,13 @@ struct __attribute__((packed)) CardHeadLayout {
   uint16_t amplitude_max_us[3];  // us; largest deflection of a row; at most 500
   uint16_t rate_max_usps;  // us/s; the command moves no faster (flutter, servos): steps become ramps; 100 to 60000
   uint16_t frequency_max_chz;  // 0.01 Hz; highest frequency of a row; at most 500: 5 Hz
-  uint8_t reserved_2[6];
+  uint8_t hold;  // 0 or 1: card_hold is the last part
+  uint8_t reserved_2[5];
   uint32_t crc;  // CRC-32 of the bytes before it and of all parts from 2 on: the card's hash; not 0
 };
 constexpr uint8_t kCardHeadLayoutSize = 96;
 constexpr uint16_t kCardHeadLayoutMagic = 17222u;
-constexpr uint8_t kCardHeadLayoutVersion = 1u;
+constexpr uint8_t kCardHeadLayoutVersion = 2u;
 constexpr uint8_t kCardHeadLayoutReserved2 = 0;
 static_assert(sizeof(CardHeadLayout) == 96, "size of CardHeadLayout");
 static_assert(offsetof(CardHeadLayout, magic) == 0, "offset of CardHeadLayout::magic");
@@ -907,7 +914,8 @@ static_assert(offsetof(CardHeadLayout, servo_max_us) == 70, "offset of CardHeadL
 static_assert(offsetof(CardHeadLayout, amplitude_max_us) == 76, "offset of CardHeadLayout::amplitude_max_us");
 static_assert(offsetof(CardHeadLayout, rate_max_usps) == 82, "offset of CardHeadLayout::rate_max_usps");
 static_assert(offsetof(CardHeadLayout, frequency_max_chz) == 84, "offset of CardHeadLayout::frequency_max_chz");
-static_assert(offsetof(CardHeadLayout, reserved_2) == 86, "offset of CardHeadLayout::reserved_2");
+static_assert(offsetof(CardHeadLayout, hold) == 86, "offset of CardHeadLayout::hold");
+static_assert(offsetof(CardHeadLayout, reserved_2) == 87, "offset of CardHeadLayout::reserved_2");
 static_assert(offsetof(CardHeadLayout, crc) == 92, "offset of CardHeadLayout::crc");
 
 // Which axis the logger learns while a row is flown.
@@ -924,7 +932,7 @@ static_assert(offsetof(CardLearningLayout, reserved) == 32, "offset of CardLearn
 // One input. Deflections are added to the sticks, in us of the servo pulse.
 struct __attribute__((packed)) CardRowLayout {
   uint8_t shape;  // see card_shape
-  uint8_t axes;  // bit 0 aileron, 1 elevator, 2 rudder: those with an amplitude
+  uint8_t axes;  // bit 0 aileron, 1 elevator, 2 rudder: those with an amplitude; 4 aileron, 5 elevator: those that hold bank and pitch meanwhile
   uint16_t quiet_ms;  // ms; between trigger and shape; no deflection, all limits watched
   uint16_t duration_ms;  // ms; of the shape; 100 or more, with quiet_ms at most 20000
   int16_t amplitude_us[3];  // us; aileron, elevator, rudder; its sign is that of the first deflection
@@ -985,11 +993,33 @@ static_assert(offsetof(CardWorthLayout, tolerance) == 20, "offset of CardWorthLa
 static_assert(offsetof(CardWorthLayout, wanted_percent) == 40, "offset of CardWorthLayout::wanted_percent");
 static_assert(offsetof(CardWorthLayout, reserved) == 45, "offset of CardWorthLayout::reserved");
 
+// How the axes are held that a row does not excite (firmware/core/attitude_hold.h): aileron by bank, elevator by pitch. The sign of a gain is that of the pulse that raises the angle.
+struct __attribute__((packed)) CardHoldLayout {
+  char model[16];  // aircraft of the identified model behind the gains
+  uint32_t model_date;  // day of its covariance, as 20261128
+  int16_t angle_gain[2];  // ticks of 0.5 us per 0.01 deg, in 1/16384; not 0
+  int16_t integral_gain[2];  // the same per sample of 5 ms, in 1/1048576
+  int16_t rate_gain[2];  // ticks per raw step of a rate, in 1/16384
+  uint16_t authority_us[2];  // us; largest deflection; 1 to amplitude_max_us of the axis
+  uint8_t reserved[12];
+};
+constexpr uint8_t kCardHoldLayoutSize = 48;
+constexpr uint8_t kCardHoldLayoutReserved = 0;
+static_assert(sizeof(CardHoldLayout) == 48, "size of CardHoldLayout");
+static_assert(offsetof(CardHoldLayout, model) == 0, "offset of CardHoldLayout::model");
+static_assert(offsetof(CardHoldLayout, model_date) == 16, "offset of CardHoldLayout::model_date");
+static_assert(offsetof(CardHoldLayout, angle_gain) == 20, "offset of CardHoldLayout::angle_gain");
+static_assert(offsetof(CardHoldLayout, integral_gain) == 24, "offset of CardHoldLayout::integral_gain");
+static_assert(offsetof(CardHoldLayout, rate_gain) == 28, "offset of CardHoldLayout::rate_gain");
+static_assert(offsetof(CardHoldLayout, authority_us) == 32, "offset of CardHoldLayout::authority_us");
+static_assert(offsetof(CardHoldLayout, reserved) == 36, "offset of CardHoldLayout::reserved");
+
 constexpr uint16_t kCardPartBytes = 48u;
 constexpr uint16_t kCardHeadParts = 3u;
 constexpr uint16_t kCardMostRows = 32u;
 constexpr uint16_t kCardMostAxes = 3u;
 constexpr uint16_t kCardAxisParts = 2u;
+constexpr uint16_t kCardHeldShift = 4u;
 constexpr uint16_t kCardComponents = 10u;
 constexpr uint16_t kCardLeastMs = 100u;
 constexpr uint16_t kCardLongestMs = 20000u;

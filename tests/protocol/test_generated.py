@@ -162,7 +162,7 @@ def test_parts_of_the_flight_card_are_whole() -> None:
     data = json.loads((ROOT / "protocol/generated/packets.json").read_text())
     part = data["numbers"]["card_part_bytes"]
     sizes = {name: _bytes(layout["fields"]) for name, layout in data["layouts"].items()}
-    single = ("card_learning", "card_row", "card_axis", "card_worth")
+    single = ("card_learning", "card_row", "card_axis", "card_worth", "card_hold")
     assert sizes == {"card_head": 2 * part} | dict.fromkeys(single, part)
     assert data["layouts"]["card_head"]["fields"][-1][0] == "crc"
     assert len(_always(data["layouts"]["card_head"])) == 3

@@ -21,7 +21,7 @@ FORMATS = {"u8": "B", "char": "s", "u16": "H", "i16": "h", "u32": "I", "f32": "f
 
 # What the aircraft of these flights may do: wide where a flight does not ask for less.
 HEAD: dict[str, Any] = {
-    "magic": 0x4346, "version": 1, "aircraft": b"ultrastick25e",
+    "magic": 0x4346, "version": 2, "aircraft": b"ultrastick25e",
     "airspeed_input": 4, "alpha_input": 0, "beta_input": 2,
     "dp_min": 2100, "dp_max": 3600, "alpha_min": 1200, "alpha_max": 2900,
     "beta_min": 1200, "beta_max": 2900, "phi_max": 6000, "theta_min": -3000, "theta_max": 3000,
@@ -29,6 +29,12 @@ HEAD: dict[str, Any] = {
     "height_min_pa": 200, "height_max_pa": 2400, "distance_max_m": 400, "still_ms": 500,
     "stick_us": 40, "servo_min_us": (1050, 1050, 1050), "servo_max_us": (1950, 1950, 1950),
     "amplitude_max_us": (200, 200, 200), "rate_max_usps": 4000, "frequency_max_chz": 500,
+}  # fmt: skip
+# `host tune --for mega` of the flight of `host simulate demo`, for the twin's servos of 25 deg in
+# 400 us: a longer pulse rolls right, and pitches down.
+HOLD: dict[str, Any] = {
+    "model": b"ultrastick25e", "model_date": 20261128, "angle_gain": (3722, -5085),
+    "integral_gain": (394, -545), "rate_gain": (240, -240), "authority_us": (100, 100),
 }  # fmt: skip
 ROW: dict[str, Any] = {"shape": DOUBLET, "axes": 2, "quiet_ms": 200, "duration_ms": 1000,
                        "amplitude_us": (0, 100, 0)}  # fmt: skip
@@ -83,13 +89,15 @@ def card(
     rows: Sequence[bytes],
     axes: Sequence[AxisCard] = (),
     axis_of_row: Sequence[int] = (),
+    hold: dict[str, Any] | None = None,
     **changed: Any,
 ) -> bytes:
     """Return a whole card with its hash; `axis_of_row` counts `axes` from 1, 0 is none."""
-    counts = {"rows": len(rows), "learned_axes": len(axes)}
+    counts = {"rows": len(rows), "learned_axes": len(axes), "hold": int(hold is not None)}
     head = _packed("card_head", HEAD | counts | changed)[:-4]
     rest = _packed("card_learning", {"axis_of_row": axis_of_row or (0,)})
     rest += b"".join(rows) + b"".join(axis_parts(axis) for axis in axes)
+    rest += b"" if hold is None else _packed("card_hold", hold)
     return head + struct.pack("<I", zlib.crc32(head + rest)) + rest
 
 

@@ -44,14 +44,18 @@ def test_short_flight_keeps_every_limit(
 
 
 @pytest.mark.parametrize("flight_elf", TESTED, indirect=True)
-@pytest.mark.parametrize(("rate_hz", "frame_s"), [(100, FRAMES_S[1]), (200, FRAMES_S[0])])
-def test_row_that_teaches_keeps_every_limit(
-    flight_elf: Path, tmp_path: Path, rate_hz: int, frame_s: float
+@pytest.mark.parametrize(
+    ("rate_hz", "frame_s", "holds"),
+    [(100, FRAMES_S[1], False), (200, FRAMES_S[0], False), (200, FRAMES_S[1], True)],
+)
+def test_row_that_teaches_or_holds_keeps_every_limit(
+    flight_elf: Path, tmp_path: Path, rate_hz: int, frame_s: float, holds: bool
 ) -> None:
     table = Table()
     figures = fly_input(
-        flight_elf, rate_hz=rate_hz, frame_s=frame_s, duration_s=ROW_S, folder=tmp_path
-    )
+        flight_elf, rate_hz=rate_hz, frame_s=frame_s, duration_s=ROW_S, folder=tmp_path,
+        holds=holds,
+    )  # fmt: skip
     input_rows(table, figures)
     assert table.missed == []
     assert len(figures.width_error_us) > 3 * 45 * ROW_S

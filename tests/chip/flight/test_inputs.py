@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flight.bench.inputs import learning_cards
+from flight.bench.inputs import input_rig, learning_cards
 from flight.faults.program import HANG, NOW_US
 from flight.input_rig import CYCLES_PER_TICK, TICKS_PER_S, InputRig
 from flight.rig import make_card
@@ -21,6 +21,7 @@ from simavr_bench import Image, ResetCause
 from simavr_bench.fork import in_fork
 
 from tests.sitl import flight_cards as cards
+from tests.sitl.hold_flight import TILTS_S
 from tests.sitl.input_faults import ROWS
 from tests.sitl.input_flight import (
     AILERON,
@@ -47,6 +48,8 @@ NEAR_TICKS = 8  # a width measured on the chip is 2.6 us off at most
 PLAIN_S = 0.025
 SERVO_S = 0.020  # between two pulses of a servo: the first plain one comes behind the last other
 SENSE_S = 0.045
+HELD_S = TRIGGER_S + TILTS_S + 1.0
+HELD_FAULT_S = HELD_S + 0.4
 
 
 @pytest.fixture(scope="module")
@@ -125,6 +128,98 @@ def test_no_slice_of_an_input_or_of_its_learning_lasts_0p3_ms(
     assert len(lengths) >= least
     print(f"{name}: {len(lengths)} slices, {max(lengths) / 16:.0f} us at most")
     assert max(lengths) < LONGEST_CYCLES
+
+
+@pytest.fixture(scope="module")
+def holding(flight_elf: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[InputRig]:
+    """A rig in the middle of a row that holds bank and pitch."""
+    folder = tmp_path_factory.mktemp("holding")
+    rig = input_rig(
+        flight_elf, rate_hz=200, frame_s=0.014, duration_s=6.0, folder=folder, holds=True
+    )
+    rig.run_to(HELD_S)
+    yield rig
+    rig.chip.close()
+
+
+def test_no_slice_of_a_row_that_holds_lasts_0p3_ms(holding: InputRig, flight_elf: Path) -> None:
+    def fly() -> list[int]:
+        watch = SliceWatch(holding.chip, flight_elf, "TestInputs3see")
+        holding.run_to(HELD_S + 1.0)
+        return [int(cycles) for cycles in watch.cycles()]
+
+    lengths = in_fork(fly)
+    assert len(lengths) >= 200
+    print(f"see, holding: {len(lengths)} slices, {max(lengths) / 16:.0f} us at most")
+    assert max(lengths) < LONGEST_CYCLES
+
+
+def _held_stick(flight: InputFlight) -> float:
+    first = frame(flight, HELD_FAULT_S)
+    flight.width_us[first:, ELEVATOR] += 100
+    return first * flight.frame_s + 0.001 + 0.0023 * ELEVATOR + 0.0025
+
+
+def _held_switch(flight: InputFlight) -> float:
+    first = frame(flight, HELD_FAULT_S)
+    flight.width_us[first:, SWITCH] = DIRECT_US
+    return first * flight.frame_s + 0.001 + 0.0023 * SWITCH + 0.0025
+
+
+def _held_silence(flight: InputFlight) -> float:
+    first = frame(flight, HELD_FAULT_S)
+    flight.width_us[first:] = 0
+    return (first - 1) * flight.frame_s + 0.001 + 1.5 * flight.frame_s
+
+
+def _held_imu_silent(flight: InputFlight) -> float:
+    flight.imu_sent[int(HELD_FAULT_S / PACKET_S) :] = False
+    return HELD_FAULT_S + 0.030
+
+
+def _held_bank(flight: InputFlight) -> float:
+    packet = int(HELD_FAULT_S / PACKET_S)
+    flight.imu[packet:, 6] = 4510
+    return packet * PACKET_S + 0.005
+
+
+def _held_roll(flight: InputFlight) -> float:
+    """45 deg of bank within 0.16 s."""
+    packet = int(HELD_FAULT_S / PACKET_S)
+    flight.imu[packet:, 6], flight.imu[packet:, 0] = 3000, 6100
+    return packet * PACKET_S + 0.005
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [_held_stick, _held_switch, _held_silence, _held_imu_silent, _held_bank, _held_roll],
+)
+def test_held_surfaces_are_plain_behind_a_fault(
+    holding: InputRig, fault: Callable[[InputFlight], float]
+) -> None:
+    def fly() -> tuple[int, int]:
+        flight = deepcopy(holding.flight)
+        known_s = fault(flight)
+        holding.change(flight)
+        holding.run_to(HELD_FAULT_S + 0.4)
+        pulses = holding.pulses()
+        late = deflected(pulses, flight, known_s + PLAIN_S - SERVO_S, near=NEAR_TICKS)
+        return deflected(pulses, flight, HELD_S - 1.0, near=NEAR_TICKS).size, late.size
+
+    moved, late = in_fork(fly)
+    assert moved > 20
+    assert late == 0
+
+
+def test_a_reset_forgets_what_was_proven_and_held(holding: InputRig) -> None:
+    def fly() -> int:
+        holding.run_to(HELD_FAULT_S)
+        holding.chip.reset(ResetCause.BROWN_OUT)
+        holding.run_to(HELD_FAULT_S + 0.5)
+        behind_s = HELD_FAULT_S + SERVO_S
+        return deflected(holding.pulses(), holding.flight, behind_s, near=NEAR_TICKS).size
+
+    assert in_fork(fly) == 0
 
 
 def _stick(flight: InputFlight) -> float:

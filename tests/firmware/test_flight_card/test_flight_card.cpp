@@ -90,7 +90,8 @@ TEST_CASE("a good head, and who wrote it"){
         HEAD_SAYS(rows, 0, CardFault::kRows) HEAD_SAYS(rows, 33, CardFault::kRows)
             HEAD_SAYS(magic, 0x4347, CardFault::kMagic) HEAD_SAYS(magic, 0x4345, CardFault::kMagic)
                 HEAD_SAYS(version, 0, CardFault::kOtherVersion)
-                    HEAD_SAYS(version, 2, CardFault::kOtherVersion)
+                    HEAD_SAYS(version, 1, CardFault::kOtherVersion)
+                    HEAD_SAYS(version, 3, CardFault::kOtherVersion)
                         HEAD_SAYS(aircraft[15], 'x', CardFault::kAircraft)
                             HEAD_SAYS(aircraft[0], 'U', CardFault::kAircraft)}
 
@@ -144,7 +145,9 @@ TEST_CASE("each limit of the head at its edge and behind it") {
   HEAD_SAYS(frequency_max_chz, 501, no)
   HEAD_SAYS(learned_axes, 3, yes)
   HEAD_SAYS(learned_axes, 4, no)
-  HEAD_SAYS(reserved_2[5], 1, no)
+  HEAD_SAYS(reserved_2[4], 1, no)
+  HEAD_SAYS(hold, 1, yes)
+  HEAD_SAYS(hold, 2, no)
   HEAD_SAYS(reserved_2[0], 1, no)
   HEAD_SAYS(beta_input, 2, yes)
   HEAD_SAYS(beta_input, 4, no)
@@ -166,6 +169,24 @@ TEST_CASE("axes that do not exist, none at all, and each alone") {
            row.amplitude_us[1] = 0, CardFault::kNone)
   ROW_SAYS(CardShape::kDoublet, row.axes = 4; row.amplitude_us[2] = 10;
            row.amplitude_us[1] = 0, CardFault::kNone)
+}
+
+TEST_CASE("a row holds what it does not move, where the card has gains") {
+  const auto says = [](uint8_t axes, uint8_t hold) {
+    CardHead head = good_head();
+    head.hold = hold;
+    CardRow row = good_row(CardShape::kDoublet);
+    row.axes = axes;
+    row.crc = core::crc16(core::kCrc16Start, &row, offsetof(CardRow, crc));
+    return core::judge_row(row, core::row_limits(head));
+  };
+  CHECK((says(0x12, 1) == CardFault::kNone));
+  CHECK((says(0x12, 0) == CardFault::kRowHold));  // no gains
+  CHECK((says(0x22, 1) == CardFault::kRowHold));  // moved and held
+  CHECK((says(0x32, 1) == CardFault::kRowHold));
+  CHECK((says(0x42, 1) == CardFault::kRowHold));  // the rudder is never held
+  CHECK((says(0x82, 1) == CardFault::kRowHold));
+  CHECK((says(0x10, 1) == CardFault::kRowAxes));  // nothing moves
 }
 
 TEST_CASE("a pulse is half a period, and a card may allow less than 5 Hz") {

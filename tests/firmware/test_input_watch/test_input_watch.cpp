@@ -236,7 +236,10 @@ TEST_CASE("until every part has been looked at nothing holds") {
   watch.start(5);
   CHECK_EQ(static_cast<int>(watch.found[core::InputWatch::kGps]),
            static_cast<int>(InputEnd::kSensorLost));
-  for (InputEnd& part : watch.found) {
+  // That of a hold is its row's.
+  CHECK_EQ(static_cast<int>(watch.found[core::InputWatch::kHold]), 0);
+  for (uint8_t at = 0; at < core::InputWatch::kHold; ++at) {
+    InputEnd& part = watch.found[at];
     CHECK_EQ(static_cast<int>(watch.outside()), static_cast<int>(InputEnd::kSensorLost));
     part = InputEnd::kDone;
   }

@@ -234,5 +234,7 @@ def _event_words(schema: Schema, word: str, arg: int) -> str:
         "input_start": f"row {row} begins",
         "input_end": f"row {row} ends: {reason}",
         "input_refused": f"row {row} refused: {reason}",
+        "hold_sense": f"hold proven: {'elevator' if arg & 1 else 'aileron'}, a longer pulse"
+        f" {'raises' if arg >> 8 & 1 else 'lowers'} the angle",
     }
     return inputs.get(word, f"{word.replace('_', ' ')} ({arg})")

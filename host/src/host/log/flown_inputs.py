@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from host.wire.flight_card import AXES, number, read_row
+from host.wire.flight_card import AXES, held_axes, number, read_row
 
 if TYPE_CHECKING:
     from host.log.flight_log import FlightLog
@@ -34,6 +34,8 @@ class FlownInput:
         Names of ``card_shape`` and of ``input_end``.
     amplitude_us : tuple of float
         Aileron, elevator, rudder; zeros where the log lost the row.
+    held : tuple of str
+        Surfaces that the logger moved to hold bank and pitch: they are feedback, not input.
     """
 
     row: int
@@ -42,6 +44,7 @@ class FlownInput:
     shape: str
     reason: str
     amplitude_us: tuple[float, ...]
+    held: tuple[str, ...] = ()
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -87,7 +90,8 @@ def inputs_of_session(session: Session) -> list[FlownInput]:
         start_s, end_s = session.seconds(np.array([first_us, last_us])).tolist()
         sizes = tuple(map(float, known["amplitude_us"])) if known else (0.0, 0.0, 0.0)
         shape = shapes.get(known["shape"], UNKNOWN) if known else UNKNOWN
-        found.append(FlownInput(row, start_s, end_s, shape, reason, sizes))
+        held = held_axes(known) if known else ()
+        found.append(FlownInput(row, start_s, end_s, shape, reason, sizes, held))
 
     for event, at_us in zip(events, t_us.tolist(), strict=True):
         code, arg = int(event["code"]), int(event["arg"])

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from host.wire.flight_card import AXES, HEAD, NONE, CardFile, components, scale
+from host.wire.flight_card import AXES, HEAD, HELD, NONE, CardFile, components, held_axes, scale
 from host.wire.schema_text import packed_schema
 
 NAMES = {"three_two_one_one": "3-2-1-1"}
@@ -14,13 +14,18 @@ NAMES = {"three_two_one_one": "3-2-1-1"}
 
 def card_document(card: CardFile) -> dict[str, Any]:
     """Return a card as plain numbers and strings, raw."""
-    head = {k: v.decode("ascii", "replace") if isinstance(v, bytes) else v
-            for k, v in card.head.items()}  # fmt: skip
     return {
         "hash": f"{card.hash:08x}",
-        "head": head,
+        "head": _plain(card.head),
         "rows": list(card.rows),
         "teaches": list(card.teaches),
+        "hold": _plain(card.hold) if card.hold else None,
+    }
+
+
+def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        k: v.decode("ascii", "replace") if isinstance(v, bytes) else v for k, v in values.items()
     }
 
 
@@ -46,9 +51,25 @@ def card_lines(card: CardFile) -> list[str]:
         f" {head['frequency_max_chz'] / 100.0:g} Hz",
         f"  starts where for 3 s {_proof(head)}",
     ]
+    if card.hold:
+        lines.append(f"  {_hold(card.hold)}")
     for k, (row, turn) in enumerate(zip(card.rows, card.teaches, strict=True), start=1):
         lines.append(f"  {k:2d}  {_row(row)}{f'; teaches {turn}' if turn else ''}")
     return lines
+
+
+def _hold(hold: Mapping[str, Any]) -> str:
+    """Return whose gains they are, how far each surface goes, and what shows its sense."""
+    model = hold["model"].decode("ascii", "replace")
+    date = str(hold["model_date"])
+    each = ", ".join(
+        f"{axis} up to {most} us, a longer pulse {'raises' if gain > 0 else 'lowers'} {angle}"
+        for axis, angle, most, gain in zip(
+            HELD, ("the right-wing-down angle", "the nose"),
+            hold["authority_us"], hold["angle_gain"], strict=True,
+        )
+    )  # fmt: skip
+    return f"holds with gains of {model}, {date[:4]}-{date[4:6]}-{date[6:]}: {each}"
 
 
 def _proof(head: Mapping[str, Any]) -> str:
@@ -79,8 +100,10 @@ def _row(row: Mapping[str, Any]) -> str:
     hertz = [1000.0 * harmonic / row["duration_ms"] for _, harmonic, _, _ in tones]
     if shape == "sweep":
         hertz = [row["first_chz"] / 100.0, row["last_chz"] / 100.0]
+    held = held_axes(row)
+    holds = f"; holds {', '.join(held)}" if held else ""
     band = f", {min(hertz):.2g} to {max(hertz):.2g} Hz" if hertz else ""
     return (
         f"{NAMES.get(shape, shape)}: {moved}; {row['duration_ms'] / 1000.0:g} s"
-        f" behind {row['quiet_ms'] / 1000.0:g} s of quiet{band}"
+        f" behind {row['quiet_ms'] / 1000.0:g} s of quiet{band}{holds}"
     )

@@ -24,8 +24,9 @@ from host.wire.schema_text import packed_schema
 
 _LONGEST_FILE = 48 * 64  # longer than any good card
 HEAD, LEARNING, ROW = "card_head", "card_learning", "card_row"
-AXIS, WORTH = "card_axis", "card_worth"
+AXIS, WORTH, HOLD = "card_axis", "card_worth", "card_hold"
 AXES = ("aileron", "elevator", "rudder")
+HELD = AXES[:2]  # by bank and by pitch: what a row may hold
 TURNS = ("pitch", "roll", "yaw")  # of `card_axis.axis`
 SHAPES = ("pulse", "doublet", "three_two_one_one", "sweep", "multisine")
 # Highest frequency of a shape in units of 1/duration, times 100000 (flight-card.md).
@@ -39,11 +40,12 @@ YAW, PITCH_SIGNALS, MOST_SIGNALS, MOST_SUMS = 2, 3, 5, 30
 
 @dataclass(frozen=True, slots=True)
 class CardFile:
-    """A card as raw numbers by field name, and the axes learned while it is flown."""
+    """A card as raw numbers by field name, the axes learned while it is flown, and its gains."""
 
     head: dict[str, Any]
     rows: tuple[dict[str, Any], ...]
     teaches: tuple[str, ...]  # of `TURNS`; empty: nothing
+    hold: dict[str, Any] | None  # of `HOLD`; None: it holds no axis
 
     @property
     def hash(self) -> int:
@@ -64,7 +66,7 @@ def number(name: str) -> int:
 
 @cache
 def fields(layout: str) -> tuple[Field, ...]:
-    """Return the fields of `HEAD`, `LEARNING`, `ROW`, `AXIS` or `WORTH`."""
+    """Return the fields of `HEAD`, `LEARNING`, `ROW`, `AXIS`, `WORTH` or `HOLD`."""
     return tuple(
         Field(name=name, type=kind, unit=unit, scale=float(scale))
         for name, kind, unit, scale in _table()["layouts"][layout]["fields"]
@@ -99,6 +101,7 @@ def card_bytes(
     rows: Sequence[Mapping[str, object]],
     axes: Sequence[tuple[Mapping[str, object], Mapping[str, object]]] = (),
     axis_of_row: Sequence[int] = (),
+    hold: Mapping[str, object] | None = None,
 ) -> bytes:
     """Return a card's file with its counts, constants and checks put in.
 
@@ -110,9 +113,11 @@ def card_bytes(
         `AXIS` and `WORTH` of what the logger learns in flight.
     axis_of_row : sequence of int
         Which of them while each row is flown, from 1; 0: none.
+    hold : mapping, optional
+        `HOLD`: gains of the axes that rows hold.
     """
     always = _table()["layouts"][HEAD]["always"]
-    counts = {"rows": len(rows), "learned_axes": len(axes)}
+    counts = {"learned_axes": len(axes), "hold": int(hold is not None)}
     first = _packed(HEAD, {**counts, **head, **always, "rows": len(rows)})
     named = [*axis_of_row, *[0] * (number("card_most_rows") - len(axis_of_row))]
     body = _packed(LEARNING, {"axis_of_row": named})
@@ -120,6 +125,7 @@ def card_bytes(
         bare = _packed(ROW, row)[:-2]
         body += bare + crc16(bare).to_bytes(2, "little")
     body += b"".join(_packed(AXIS, axis) + _packed(WORTH, worth) for axis, worth in axes)
+    body += b"" if hold is None else _packed(HOLD, hold)
     return first[:-4] + zlib.crc32(first[:-4] + body).to_bytes(4, "little") + body
 
 
@@ -141,9 +147,14 @@ def read_card(data: bytes) -> CardFile:
     head, rows = _head_and_rows(data)
     heads, each = number("card_head_parts"), parts(data)
     behind = heads + head["rows"]
-    learned = [_numbers(AXIS, part)["axis"] for part in each[behind :: number("card_axis_parts")]]
+    last = behind + number("card_axis_parts") * head["learned_axes"]
+    learned = [
+        _numbers(AXIS, part)["axis"] for part in each[behind : last : number("card_axis_parts")]
+    ]
+    hold = _numbers(HOLD, each[last]) if head["hold"] else None
     axes = _numbers(LEARNING, each[heads - 1])["axis_of_row"][: len(rows)]
-    return CardFile(head, tuple(rows), tuple(TURNS[learned[n - 1]] if n else "" for n in axes))
+    teaches = tuple(TURNS[learned[n - 1]] if n else "" for n in axes)
+    return CardFile(head, tuple(rows), teaches, hold)
 
 
 def _head_and_rows(data: bytes) -> tuple[dict[str, Any], list[dict[str, Any]]]:
@@ -154,9 +165,16 @@ def _head_and_rows(data: bytes) -> tuple[dict[str, Any], list[dict[str, Any]]]:
 
 
 def body_parts(head: bytes) -> int:
-    """Return how many parts follow the first three: the rows, and two of each learned axis."""
+    """Return how many parts follow the first three: rows, two of each learned axis, the hold."""
     found = _numbers(HEAD, head)
-    return int(found["rows"]) + number("card_axis_parts") * int(found["learned_axes"])
+    learned = number("card_axis_parts") * int(found["learned_axes"])
+    return int(found["rows"]) + learned + int(found["hold"])
+
+
+def held_axes(row: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the surfaces that a row holds."""
+    bits = row["axes"] >> number("card_held_shift")
+    return tuple(axis for k, axis in enumerate(AXES) if bits >> k & 1)
 
 
 def read_row(part: bytes) -> dict[str, Any]:
@@ -180,14 +198,17 @@ def card_faults(data: bytes) -> list[str]:
     size, heads, most = (number(f"card_{n}") for n in ("part_bytes", "head_parts", "most_rows"))
     learned = number("card_axis_parts") * number("card_most_axes")
     found = len(data) // size - heads
-    if len(data) % size or not 1 <= found <= most + learned:
+    if len(data) % size or not 1 <= found <= most + learned + 1:
         return [
-            f"{len(data)} bytes, expected {size} times {heads + 1} to {heads + most + learned}:"
-            " the head, 1 to 32 rows, two parts of each axis that is learned"
+            f"{len(data)} bytes, expected {size} times {heads + 1} to {heads + most + learned + 1}:"
+            " the head, 1 to 32 rows, two parts of each axis that is learned, one of the hold"
         ]
-    rows = found - number("card_axis_parts") * _numbers(HEAD, data)["learned_axes"]
-    if not 1 <= rows <= most:
-        return [f"{found} parts behind the head and {found - rows} of them of learned axes"]
+    said = _numbers(HEAD, data)
+    rows = found - number("card_axis_parts") * said["learned_axes"] - said["hold"]
+    if not 1 <= rows <= most or said["hold"] > 1:
+        return [
+            f"{found} parts behind the head and {found - rows} of them of learned axes and hold"
+        ]
     always = _table()["layouts"][HEAD]["always"]
     head, each = _head_and_rows(data)
     wrong = [
@@ -202,6 +223,8 @@ def card_faults(data: bytes) -> list[str]:
     if head["crc"] != check or check == 0:
         wrong.append(f"CRC-32 is {head['crc']:08x}, expected {check:08x}: a byte was changed")
     wrong += [*_limit_faults(head), *_learning_faults(data, rows, head["learned_axes"])]
+    if head["hold"]:
+        wrong += _hold_faults(_numbers(HOLD, data[-size:]), head)
     return [*wrong, *(x for k, row in enumerate(each)
             for x in _row_faults(k + 1, row, head, data[(heads + k) * size :][:size]))]  # fmt: skip
 
@@ -214,7 +237,11 @@ def _learning_faults(data: bytes, rows: int, axes: int) -> Iterator[str]:
     for place, axis in enumerate(named):
         if axis > axes:
             yield f"row {place + 1}: learns axis {axis}, expected 0 to {axes}"
-    for n, part in enumerate(parts(data)[heads + rows :: number("card_axis_parts")]):
+        row = _numbers(ROW, parts(data)[heads + place])
+        if axis and held_axes(row):
+            yield f"row {place + 1}: holds and learns, expected one of both"
+    behind = parts(data)[heads + rows : heads + rows + number("card_axis_parts") * axes]
+    for n, part in enumerate(behind[:: number("card_axis_parts")]):
         axis = _numbers(AXIS, part)
         signals = MOST_SIGNALS if axis["axis"] else PITCH_SIGNALS
         if axis["axis"] > YAW or axis["told"] >> signals:
@@ -222,12 +249,27 @@ def _learning_faults(data: bytes, rows: int, axes: int) -> Iterator[str]:
         count, most = axis["harmonic_count"], min(len(axis["harmonics"]), MOST_SUMS // signals)
         if not 1 <= count <= most:
             yield f"learned axis {n + 1}: {count} harmonics, expected 1 to {most}"
-    for place, part in enumerate(parts(data)[heads + rows :]):
+    for place, part in enumerate(behind):
         n, worth = divmod(place, number("card_axis_parts"))
         record = np.frombuffer(part, dtype=dtype(WORTH if worth else AXIS), count=1)
         for name in record.dtype.names or ():
             if record[name].dtype.kind == "f" and not np.isfinite(record[name]).all():
                 yield f"learned axis {n + 1}: {name} is not finite"
+
+
+def _hold_faults(hold: Mapping[str, Any], head: Mapping[str, Any]) -> Iterator[str]:
+    for k, axis in enumerate(HELD):
+        gain = hold["angle_gain"][k]
+        others = (hold["integral_gain"][k], hold["rate_gain"][k])
+        least = np.iinfo(np.int16).min  # it has no opposite
+        if gain == 0 or least in (gain, *others) or any(gain * other < 0 for other in others):
+            found = ", ".join(map(str, (gain, *others)))
+            yield f"gains of the {axis} {found}, expected of one sign, the first not 0"
+        most = head["amplitude_max_us"][k]
+        if not 1 <= hold["authority_us"][k] <= most:
+            yield f"authority of the {axis} {hold['authority_us'][k]} us, expected 1 to {most}"
+    if any(hold["reserved"]):
+        yield "reserved bytes of the hold are not 0"
 
 
 def _limit_faults(head: Mapping[str, Any]) -> Iterator[str]:
@@ -267,8 +309,15 @@ def _row_faults(
     if not shape:
         yield f"{where}: shape {row['shape']}, expected of {', '.join(SHAPES)}"
     moved = sum(1 << k for k, size in enumerate(row["amplitude_us"]) if size)
-    if row["axes"] != moved or not moved:
-        yield f"{where}: axes {row['axes']:03b}, expected {moved:03b}: those with an amplitude"
+    said = row["axes"] & (1 << number("card_held_shift")) - 1
+    if said != moved or not moved:
+        yield f"{where}: axes {said:03b}, expected {moved:03b}: those with an amplitude"
+    held = row["axes"] >> number("card_held_shift")
+    if held and (held >= 1 << len(HELD) or held & moved or not head["hold"]):
+        yield (
+            f"{where}: holds {held:03b}, expected of {', '.join(HELD)}, none that it moves, and"
+            " gains on the card"
+        )
     longest, least = number("card_longest_ms"), number("card_least_ms")
     if row["duration_ms"] < least or row["duration_ms"] + row["quiet_ms"] > longest:
         yield (

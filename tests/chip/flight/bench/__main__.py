@@ -6,6 +6,7 @@ import argparse
 import subprocess
 import sys
 import tempfile
+from itertools import product
 from pathlib import Path
 
 from compilers import TESTED
@@ -52,7 +53,7 @@ def main() -> int:
                         seed=asked.seed,
                     )
                     flight_rows(table, flight, depth, room_bytes)
-                    for frame_s in FRAMES_S:
+                    for holds, frame_s in product((False, True), FRAMES_S):
                         input_rows(
                             table,
                             fly_input(
@@ -61,6 +62,7 @@ def main() -> int:
                                 frame_s=frame_s,
                                 duration_s=ROW_S,
                                 folder=Path(folder),
+                                holds=holds,
                             ),
                         )
     except (FlightError, ImageError) as error:

@@ -1,7 +1,8 @@
-"""Fly a row of three axes that teaches one, and measure the recorder while it runs.
+"""Fly a row of three axes that teaches one or holds two, and measure the recorder while it runs.
 
 The row is the costliest there is: ten sines on three axes, and the roll axis with all of its
-signals. Receivers of 20 and of 14 ms; the card stalls as in the flight without a flight card.
+signals; or ten sines on the rudder while aileron and elevator are held. Receivers of 20 and of
+14 ms; the card stalls as in the flight without a flight card.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from simavr_bench import Chip
 
 import host
 from tests.sitl import flight_cards as cards
+from tests.sitl.hold_flight import TILTS_S, hold_flight
 from tests.sitl.input_flight import ELEVATOR, TRIGGER_S, UP_S, input_flight
 
 FRAMES_S = (0.020, 0.014)
@@ -36,6 +38,7 @@ BEHIND_S = 2.5  # the last second's estimates are told, the last block is writte
 SURFACES = 3
 CYCLES_PER_US, TICKS_PER_US = CYCLES_PER_S // 1_000_000, 2
 PAINTED_S, RAM_END = 0.03, 0x2200
+PERIOD_CYCLES, ON_ITS_WAY_CYCLES = 20_000 * CYCLES_PER_US, 20 * CYCLES_PER_US
 LEARNED_HEAD = b"\xa5\x5a\x12\x0f"  # of frame `learned` on the radio
 ROLL_CARD = learning_card("ultrastick25e", ROLL, LearningCondition(17.0, harmonics=SIX_HARMONICS))
 
@@ -52,6 +55,16 @@ def learning_cards(duration_s: float) -> bytes:
     return cards.card([row], [ROLL_CARD], [1])
 
 
+def holding_card(duration_s: float) -> bytes:
+    """Return a flight card: ten sines on the rudder, aileron and elevator held."""
+    row = cards.row(
+        shape=cards.MULTISINE, axes=4 | 3 << 4, quiet_ms=round(1000 * QUIET_S),
+        duration_ms=round(1000 * duration_s), amplitude_us=(0, 0, 120),
+        components=[byte for k in range(10) for byte in (2 + 3 * k, 25 * k, 64 * 2 + 18)],
+    )  # fmt: skip
+    return cards.card([row], hold=cards.HOLD)
+
+
 @dataclass(frozen=True, slots=True)
 class InputFigures:
     """What was measured while the row ran.
@@ -64,6 +77,8 @@ class InputFigures:
         Of every surface pulse of that time against the width commanded as it began.
     deflected_us : float
         From the narrowest to the widest of those of the elevator, whose stick rests.
+    held : bool
+        Whether the row held bank and pitch, in place of teaching.
     told : int
         Derivatives that were told by radio.
     untouched_bytes : int
@@ -79,6 +94,7 @@ class InputFigures:
     busy_fraction: float
     width_error_us: NDArray[np.float64]
     deflected_us: float
+    held: bool
     told: int
     untouched_bytes: int
     frames_lost: int
@@ -90,7 +106,8 @@ class CommandWatch:
     """Compares each surface pulse on the pins with the width that the firmware asked for.
 
     The timers take up a width as a pulse begins: what stands in the firmware's memory at that
-    instant is the command.
+    instant is the command. One that is on its way from there into the timer's register as the
+    pulse begins is the next pulse's: then the one that stood there 20 us ago is this one's.
 
     Attributes
     ----------
@@ -103,7 +120,8 @@ class CommandWatch:
         self._chip = chip
         self._address = find_symbol(chip, "g_instrument") + place.offset
         pins = [pin for _, pin in SERVOS.values()][:SURFACES]
-        self._begun: list[tuple[int, int] | None] = [None] * SURFACES
+        self._begun: list[tuple[int, set[int]] | None] = [None] * SURFACES
+        self._before: dict[int, int] = {}
         self.width_us: list[list[float]] = [[] for _ in pins]
         self.error_us: list[list[float]] = [[] for _ in pins]
         for servo, pin in enumerate(pins):
@@ -112,16 +130,32 @@ class CommandWatch:
     def _see(self, servo: int, level: bool, cycle: int) -> None:
         begun = self._begun[servo]
         if level:
-            memory = self._chip.data(self._address + 2 * servo, 2)
-            self._begun[servo] = cycle, int.from_bytes(memory, "little")
+            now = self._command(servo)
+            self._begun[servo] = cycle, {now, self._before.get(servo, now)}
+            self._chip.at(cycle + PERIOD_CYCLES - ON_ITS_WAY_CYCLES, partial(self._keep, servo))
         elif begun is not None:
             width_us = (cycle - begun[0]) / CYCLES_PER_US
             self.width_us[servo].append(width_us)
-            self.error_us[servo].append(abs(width_us - begun[1] / TICKS_PER_US))
+            self.error_us[servo].append(
+                min(abs(width_us - ticks / TICKS_PER_US) for ticks in begun[1])
+            )
+
+    def _keep(self, servo: int) -> None:
+        self._before[servo] = self._command(servo)
+
+    def _command(self, servo: int) -> int:
+        return int.from_bytes(self._chip.data(self._address + 2 * servo, 2), "little")
 
 
 def input_rig(
-    elf: Path, *, rate_hz: int, frame_s: float, duration_s: float, folder: Path, seed: int = SEED
+    elf: Path,
+    *,
+    rate_hz: int,
+    frame_s: float,
+    duration_s: float,
+    folder: Path,
+    seed: int = SEED,
+    holds: bool = False,
 ) -> InputRig:
     """Return a rig, switched on, whose flight triggers one row.
 
@@ -139,29 +173,45 @@ def input_rig(
         Where the card's image goes.
     seed : int
         Of the flight.
+    holds : bool
+        The row holds two axes; behind the sign come the tilts.
     """
-    flight = input_flight(
-        TRIGGER_S + QUIET_S + duration_s + BEHIND_S, np.random.default_rng(seed), frame_s
-    )
-    flight.width_us[int((UP_S + 1.0) / frame_s) :, :3] = 1500
-    eeprom = bytearray(cards.eeprom_with(learning_cards(duration_s)))
+    seconds, random = TRIGGER_S + QUIET_S + duration_s + BEHIND_S, np.random.default_rng(seed)
+    up_s = UP_S
+    if holds:
+        flight = hold_flight(seconds + TILTS_S, random, frame_s)
+        up_s += TILTS_S
+    else:
+        flight = input_flight(seconds, random, frame_s)
+    flight.width_us[int((up_s + 1.0) / frame_s) :, :3] = 1500
+    card = holding_card(duration_s) if holds else learning_cards(duration_s)
+    eeprom = bytearray(cards.eeprom_with(card))
     for address, piece in settings_image(rate_hz=rate_hz).eeprom.items():
         eeprom[address : address + len(piece)] = piece
     return InputRig(elf, make_card(folder / CARD), flight, bytes(eeprom))
 
 
 def fly_input(
-    elf: Path, *, rate_hz: int, frame_s: float, duration_s: float, folder: Path, seed: int = SEED
+    elf: Path,
+    *,
+    rate_hz: int,
+    frame_s: float,
+    duration_s: float,
+    folder: Path,
+    seed: int = SEED,
+    holds: bool = False,
 ) -> InputFigures:
     """Fly one row at one rate of the log, with one receiver; arguments as of :func:`input_rig`."""
     rig = input_rig(
-        elf, rate_hz=rate_hz, frame_s=frame_s, duration_s=duration_s, folder=folder, seed=seed
-    )
+        elf, rate_hz=rate_hz, frame_s=frame_s, duration_s=duration_s, folder=folder, seed=seed,
+        holds=holds,
+    )  # fmt: skip
     chip = rig.chip
     stack = int(chip.symbols["_end"][0]) & 0xFFFF
     rig.run_to(PAINTED_S)
     painted = chip.data(stack, RAM_END - stack)
-    begin_s, end_s = TRIGGER_S + QUIET_S + 0.1, TRIGGER_S + QUIET_S + duration_s
+    trigger_s = TRIGGER_S + (TILTS_S if holds else 0.0)
+    begin_s, end_s = trigger_s + QUIET_S + 0.1, trigger_s + QUIET_S + duration_s
     rig.run_to(begin_s)
     chip.clear_statistics()
     begin = chip.cycle
@@ -191,6 +241,7 @@ def fly_input(
         busy_fraction=load.busy_fraction,
         width_error_us=errors,
         deflected_us=deflected_us,
+        held=holds,
         told=told,
         untouched_bytes=untouched,
         frames_lost=log.loss.frames,

@@ -62,12 +62,17 @@ def of_log(log: FlightLog, columns: dict[str, Array], notes: list[str]) -> Forei
     """Return the columns of a log with how they were recorded."""
     from host.log.flown_inputs import flown_inputs
 
+    inputs = flown_inputs(log)
+    held = sorted({one.row + 1 for one in inputs if one.held})
+    if held:
+        rows = ", ".join(map(str, held))
+        notes = [*notes, f"rows {rows} of the card held bank and pitch: feedback, not input"]
     return Foreign(
         columns,
         notes=notes,
         recording=recording_of_log(log),
         calibration=log.calibration,
-        inputs=flown_inputs(log),
+        inputs=inputs,
     )
 
 

@@ -87,12 +87,18 @@ def logger_flight(
     Raises
     ------
     UsageError
-        The flight card is not of this card, nothing was recorded, or no agreement.
+        The flight card is not of this card or holds axes, nothing was recorded, or no agreement.
     """
     wrong = card_faults(flight_card)
     if wrong:
         raise UsageError(f"no good flight card: {wrong[0]}")
     rows = read_card(flight_card)
+    if rows.hold is not None:
+        # Aircraft and recorder are run in turns: what is fed back would never settle.
+        raise UsageError(
+            "this flight card holds axes, and aircraft and recorder fly one after the other here:"
+            " make it without --hold to simulate its inputs"
+        )
     _same_inputs(rows, card)
     plane = aircraft or load(card.aircraft)
     speed = card.flight.airspeed_mps or plane.scalar("trim.airspeed_mps")
