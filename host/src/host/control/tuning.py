@@ -243,7 +243,7 @@ def tune(
             noise.get(name, 0.0),
         )
         usual = {one.name: one.default for one in problem.structure.settings.values()}
-        # Where no firmware has the gains yet, none was before.
+        # Where no log has the gains, none was before.
         before = logged if chosen.words else usual
         found.append(AxisTuning(problem, design(problem, seed=seed), before))
     flown = () if isinstance(source, Sequence) else _airspeeds_mps(source)

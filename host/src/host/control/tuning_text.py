@@ -49,7 +49,7 @@ def tuning_lines(found: Tuning) -> Iterator[str]:
             words["halve"] += f" and {found.yaw.settings[found.yaw.problem.yaw.damper].name}"
         yield from (line.format(**words) for line in FIRST_FLIGHT)
     else:
-        yield "No firmware flies these gains yet: they are for a card's hold of wings and pitch."
+        yield "The logger flies them in rows of a flight card: host plan --card FILE --hold GAINS."
 
 
 def _axis_lines(one: AxisTuning) -> Iterator[str]:

@@ -18,10 +18,20 @@ from host.constants import GRAVITY_MPS2
 from host.errors import UsageError
 from host.physical.calibration import Calibration
 from host.planning.flight_envelope import Envelope
+from host.planning.hold_card import HoldGains, hold_part
 from host.planning.learning_card import TURNS, learning_parts
 from host.planning.onboard_sums import AxisCard
 from host.twin.testcard.cards import Card, Segment, input_s
-from host.wire.flight_card import AXES, HEAD, TRAVEL_US, card_bytes, card_faults, number, scale
+from host.wire.flight_card import (
+    AXES,
+    HEAD,
+    HELD,
+    TRAVEL_US,
+    card_bytes,
+    card_faults,
+    number,
+    scale,
+)
 from host.wire.schema_text import packed_schema
 
 SHAPES = {"3211": "three_two_one_one"}
@@ -39,6 +49,7 @@ def logger_card(
     calibration: Calibration,
     envelope: Envelope | None = None,
     learned: Sequence[AxisCard] = (),
+    hold: HoldGains | None = None,
 ) -> bytes:
     """Return the file of a card, good by `host.wire.flight_card.card_faults`.
 
@@ -53,6 +64,9 @@ def logger_card(
     learned : sequence of AxisCard
         What the logger learns in flight (`learned_axes`): rows that move the same teach in
         turn the axes that they move.
+    hold : HoldGains, optional
+        With it every row holds bank and pitch where it does not move their surface, and nothing is
+        learned: there is one memory for both.
 
     Raises
     ------
@@ -69,17 +83,28 @@ def logger_card(
         )
     rows = [_row(f"{card.name}: input {k + 1}", s, calibration, around.amplitude_share)
             for k, s in enumerate(points)]  # fmt: skip
+    if hold is not None:
+        learned = ()
+        for row in rows:
+            row["axes"] |= _held(row) << number("card_held_shift")
     taught = {one.axis: k + 1 for k, one in enumerate(learned)}
+    head = _head(card, aircraft, calibration, around, rows)
     data = card_bytes(
-        _head(card, aircraft, calibration, around, rows),
+        head,
         rows,
         [learning_parts(one) for one in learned],
         _axis_of_row(points, taught),
+        None if hold is None else hold_part(hold, calibration, head["amplitude_max_us"][:2]),
     )
     wrong = card_faults(data)
     if wrong:
         raise LoggerCardError(f"{card.name}: {'; '.join(wrong)}")
     return data
+
+
+def _held(row: Mapping[str, Any]) -> int:
+    """Return the bits of the surfaces that a row leaves alone, of those that can be held."""
+    return sum(1 << k for k, _ in enumerate(HELD) if not row["axes"] >> k & 1)
 
 
 def _axis_of_row(points: Sequence[Segment], taught: Mapping[str, int]) -> list[int]:
@@ -190,6 +215,12 @@ def _servos(
         high.append(min(math.floor(line.zero[0] + throw), TRAVEL_US[1]))
         rates.append(aircraft.scalar("servo.rate_limit_radps") / abs(line.slope[0]))
     largest = [max(abs(row["amplitude_us"][k]) for row in rows) for k in range(len(AXES))]
+    slopes = [abs(calibration.lines[f"pulse.{axis}"].slope[0]) for axis in AXES]
+    most_rad = max(us * slope for us, slope in zip(largest, slopes, strict=True))
+    for k, _ in enumerate(HELD):
+        # A surface that is held and never moved: as far as the card moves another.
+        if largest[k] == 0 and any(row["axes"] >> number("card_held_shift") for row in rows):
+            largest[k] = min(math.floor(most_rad / slopes[k]), number("card_most_amplitude_us"))
     rate = min(max(round(min(rates)), 100), 60_000)
     return {
         "servo_min_us": low, "servo_max_us": high, "amplitude_max_us": largest,

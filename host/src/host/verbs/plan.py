@@ -108,6 +108,13 @@ def _add_designs(parser: argparse.ArgumentParser) -> None:
         help="write the inputs for the logger to fly, such as flight.card (host card write)",
     )
     parser.add_argument(
+        "--hold",
+        type=Path,
+        metavar="TOML",
+        help="with --card: gains of host tune --for mega; rows then hold bank and pitch where they"
+        " do not move their surface, and teach nothing in flight",
+    )
+    parser.add_argument(
         "--calibration",
         type=Path,
         metavar="TOML",
@@ -196,6 +203,8 @@ def _check(args: argparse.Namespace) -> None:
         raise UsageError(
             "--card is flown by the logger: name the aircraft it is designed for, --aircraft FILE"
         )
+    if args.hold is not None and args.logger_card is None:
+        raise UsageError("--hold is of the logger's file: name it, --card FILE")
     if args.logger_card is not None:
         check_destination("--card", args.logger_card, folder=False)
     if args.save is not None and args.save.suffix != ".toml":
@@ -254,6 +263,7 @@ def _write_logger_card(card: Card, args: argparse.Namespace) -> None:
     from host.export.atomic_files import atomic_write
     from host.physical.calibration import load_calibration
     from host.planning.flight_envelope import Envelope
+    from host.planning.hold_card import read_gains
     from host.planning.learning_card import learned_axes
     from host.planning.logger_card import logger_card
     from host.wire.card_text import card_lines
@@ -269,7 +279,8 @@ def _write_logger_card(card: Card, args: argparse.Namespace) -> None:
     # A linear aircraft has accelerations only: its inertia and coefficients cannot be separated.
     learned = [] if plane.straight is not None else learned_axes(card.aircraft, card, calibration)
     envelope = Envelope(amplitude_share=args.amplitude)
-    data = logger_card(card, plane, calibration, envelope, learned)
+    hold = None if args.hold is None else read_gains(args.hold)
+    data = logger_card(card, plane, calibration, envelope, learned, hold)
     with atomic_write(args.logger_card) as part:
         part.write_bytes(data)
     print("\n".join(card_lines(read_card(data))))
