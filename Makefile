@@ -52,7 +52,7 @@ bench: setup ## damage, speed and identification beside their peers
 study: setup sitl ## tables and pictures of identification in build/study, nine minutes (SIZE=full: two hours)
 	@cd host && ../$(PYTHON) -m studies ../build/study --size $(or $(SIZE),small)
 
-tune-bench: setup sitl ## gains of one identified flight flown on 200 aircraft: margins by injected sines, steps, gusts (AUTOPILOT=px4, inav; half an hour, by what 16 took)
+tune-bench: setup sitl ## gains of one identified flight flown on 200 aircraft: margins by injected sines, steps, gusts (AUTOPILOT=px4, inav, mega; five minutes of a core for ArduPlane)
 	@cd host && ../$(PYTHON) -m studies.tuned_flights $(if $(AUTOPILOT),--autopilot $(AUTOPILOT)) $(TUNE_BENCH)
 
 judgement: setup sitl ## one score of answers over worlds: right, wrong, refused, honest; four flights a world, eight minutes of a core (SIZE=full: 200, a night; FLIGHTS=n)

@@ -296,7 +296,7 @@ def test_the_worst_aircraft_of_the_contour_is_found_where_it_is_known() -> None:
     assert worst is not None
     assert worst.moved[0][0] == "L_da"
     assert worst.moved[0][1] == pytest.approx(0.196, abs=1e-3)
-    assert "at L_da +20 %, L_p +0 %" in worst.line
+    assert "at L_da +20 %" in worst.line
     known = replace(asked, axis=replace(axis, mean=np.array([-10.0, 150.0 * 1.196]),
                                         covariance=np.zeros((2, 2))))  # fmt: skip
     exact = replace(known, actuator=replace(DRIVE, travel_share=0.0, bandwidth_share=0.0,
@@ -304,6 +304,18 @@ def test_the_worst_aircraft_of_the_contour_is_found_where_it_is_known() -> None:
     inner, _ = draw(exact, seed=1, count=1).judged(gains)
     assert worst.gain_db == pytest.approx(float(inner.gain_db[0]), abs=0.01)
     assert worst_on_contour(known, gains) is None
+
+
+def test_a_negative_derivative_that_grows_is_off_upwards() -> None:
+    asked = problem(0.0)
+    axis = replace(asked.axis, covariance=np.diag([(0.1 * 10.0) ** 2, 0.0]))
+    gains = asked.structure.completed({"P": 0.25, "D": 0.0, "TC": 0.5}, 0.17)
+    worst = worst_on_contour(replace(asked, axis=axis), gains)
+    assert worst is not None
+    size = -10.0 * (1.0 + dict(worst.moved)["L_p"])
+    drives = np.array([[DRIVE.travel_rad, DRIVE.bandwidth_hz, DRIVE.delay_s]])
+    inner, _ = scenarios_of(asked, np.array([[size, 150.0]]), drives).judged(gains)
+    assert worst.gain_db == pytest.approx(float(inner.gain_db[0]), abs=1e-6)
 
 
 def test_no_aircraft_drawn_on_the_contour_is_worse() -> None:

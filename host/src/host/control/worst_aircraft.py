@@ -100,5 +100,5 @@ def worst_on_contour(problem: Problem, gains: Mapping[str, float]) -> WorstAircr
     shift = radius * root @ best
     far = np.abs(shift) / np.sqrt(np.maximum(np.diag(axis.covariance), 1e-300))
     order = [k for k in np.argsort(-far) if axis.mean[k] != 0.0]
-    moved = tuple((axis.names[k], float(shift[k] / abs(axis.mean[k]))) for k in order)
+    moved = tuple((axis.names[k], float(shift[k] / axis.mean[k])) for k in order)
     return WorstAircraft(float(gain[0]), float(phase[0]), moved)
