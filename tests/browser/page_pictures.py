@@ -1,8 +1,8 @@
 """Take the pictures of the pages in `host/*.md` anew: a virtual flight and a virtual walk.
 
-    python -m tests.browser.page_pictures            # two minutes; then look at them
+    python -m tests.browser.page_pictures            # five minutes; then look at them
 
-The flight is the card that `host plan` designs, received from its radio twice as fast.
+The flight is the card that `host plan` designs, with turns, received from its radio.
 """
 
 from __future__ import annotations
@@ -10,10 +10,12 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 from host.export.toml import dumps
 from host.planning.card_design import design, document
+from host.twin.testcard.cards import Card, Segment
 from studies.radio_flights import radio_flight
 
 from tests.browser.chromium import LAPTOP, PHONE, Chromium, Page
@@ -21,20 +23,32 @@ from tests.browser.served_page import served_page
 
 AIRCRAFT, SEED = "ultrastick25e", 31
 POINTS = 6  # flown and judged before the picture: of roll and yaw nothing is known yet
-PATIENCE_S = 150.0
+PATIENCE_S = 300.0
+TURN_S = 10.4  # of 180 deg at 17 m/s
 WALK = "sim:walk/half_travel@4x"
+
+
+def with_turns(card: Card) -> Card:
+    """Return the card with a turn before every second point: it stays within 300 m of home."""
+    turn = Segment("turn", duration_s=TURN_S, bank_deg=30.0)
+    segments: list[Segment] = []
+    points = 0
+    for segment in card.segments:
+        points += segment.kind != "trim"
+        segments += [turn, segment] if segment.kind != "trim" and points % 2 == 0 else [segment]
+    return replace(card, segments=tuple(segments))
 
 
 def flight(folder: Path, into: Path) -> None:
     """Picture the page in flight, on a phone, and when nothing comes any more."""
-    card = design(AIRCRAFT)
+    card = with_turns(design(AIRCRAFT))
     (folder / "plan.toml").write_text(dumps(document(card)), encoding="utf-8")
     flown = radio_flight(card, SEED)
     (folder / "plan.radio").write_bytes(b"".join(part.data for part in flown.sent))
     (folder / "calibration.toml").write_text(flown.calibration, encoding="utf-8")
     words = ("--card", "plan.toml", "--aircraft", AIRCRAFT, "--calibration", "calibration.toml")
     # The browser first: the flight does not wait for one.
-    with Chromium() as browser, served_page(folder, "live", "plan.radio@2x", *words) as live:
+    with Chromium() as browser, served_page(folder, "live", "plan.radio", *words) as live:
         page = browser.open(live.url)
         which = "document.getElementById('point-which').textContent"
         page.wait_for(f"Number({which}.split(' ')[1]) >= {POINTS}", PATIENCE_S)

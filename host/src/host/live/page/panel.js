@@ -3,6 +3,8 @@
 const byId = (id) => document.getElementById(id);
 const figure = (value, digits) => (value === null || value === undefined ? "-" : value.toFixed(digits));
 
+const NEAR_M = 20; // of home: nearer, GPS does not tell where it lies
+
 function lamp(id, word, kind) {
   byId(id).className = `lamp ${kind}`;
   const text = byId(`${id}-text`);
@@ -63,7 +65,8 @@ function showFacts(state, link, system) {
 // Home as the aircraft sees it: how far, where to turn, and the limit that it nears.
 export function showHome(home) {
   byId("home-distance").textContent = figure(home?.distance_m, 0);
-  byId("home-bearing").textContent = figure(home?.bearing_deg, 0);
+  const far = Boolean(home) && home.distance_m > NEAR_M;
+  byId("home-bearing").textContent = far ? figure(home.bearing_deg, 0) : "-";
   const outside = Boolean(home) && home.distance_m > home.limit_m;
   byId("home-distance").parentElement.classList.toggle("bad", outside);
   const limit = byId("limit");

@@ -42,7 +42,7 @@ export class Plan {
     this.track(pen, place);
     if (this.points.length) this.aircraft(pen, place, heading);
     this.scale(pen, place, width, height);
-    if (this.wind) this.arrow(pen, width);
+    if (this.wind && Math.hypot(...this.wind) >= 0.5) this.arrow(pen, width);
   }
 
   frame(width, height) {
