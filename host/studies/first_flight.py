@@ -20,6 +20,8 @@ PICTURES = HOST / "pictures"
 SHOWN = ("longitudinal_fit.svg", "longitudinal_intervals.svg")
 DIGITS = re.compile(r"(\d+\.\d\d)\d+")  # a hundredth of a point is nothing to see
 ANSWER = re.compile(r"(?<=```\n)Known from this flight.*?(?=```\n)", re.DOTALL)
+MANEUVERS = re.compile(r"(?<=```\n)\d+ maneuvers found.*?(?=```\n)", re.DOTALL)
+LISTED = 5  # lines of `host maneuvers` that the page shows
 STALE = 6
 
 
@@ -47,12 +49,24 @@ def flown_answer(folder: Path) -> str:
     return printed.getvalue()
 
 
-def page_with(answer: str, page: str) -> str:
-    """Return the page with this answer in place of the one that it shows."""
-    text, count = ANSWER.subn(lambda _: answer.rstrip("\n") + "\n", page)
-    if count != 1:
-        raise ValueError(f"{PAGE.name} shows {count} answers, expected 1")
-    return text
+def flown_maneuvers(folder: Path) -> str:
+    """Return the head of what `host maneuvers` prints of the flight that was flown there."""
+    flight, printed = folder / "flight", io.StringIO()
+    calibration = ["--calibration", str(flight / "calibration.toml")]
+    with contextlib.redirect_stdout(printed):
+        host(["maneuvers", str(flight / "flight.bin"), *calibration])
+    return "\n".join([*printed.getvalue().splitlines()[:LISTED], "   ..."])
+
+
+def page_with(answer: str, page: str, maneuvers: str | None = None) -> str:
+    """Return the page with this answer, and these maneuvers, in place of what it shows."""
+    shown = [(ANSWER, "answers", answer)]
+    shown += [] if maneuvers is None else [(MANEUVERS, "lists of maneuvers", maneuvers)]
+    for pattern, what, text in shown:
+        page, count = pattern.subn((text.rstrip() + "\n").replace("\\", r"\\"), page)
+        if count != 1:
+            raise ValueError(f"{PAGE.name} shows {count} {what}, expected 1")
+    return page
 
 
 def main(words: list[str]) -> int:
@@ -60,8 +74,9 @@ def main(words: list[str]) -> int:
     page = PAGE.read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory() as name:
         answer = flown_answer(Path(name))
+        maneuvers = flown_maneuvers(Path(name))
         if "--check" in words:
-            stale = page_with(answer, page) != page
+            stale = page_with(answer, page, maneuvers) != page
             if stale:
                 sys.stderr.write(f"{PAGE.name} shows another answer: run studies.first_flight\n")
             return STALE if stale else 0
@@ -69,7 +84,7 @@ def main(words: list[str]) -> int:
         for picture in SHOWN:
             text = Path(name, "flight", "pictures", picture).read_text(encoding="utf-8")
             (PICTURES / picture).write_text(DIGITS.sub(r"\1", text), encoding="utf-8")
-    PAGE.write_text(page_with(answer, page), encoding="utf-8")
+    PAGE.write_text(page_with(answer, page, maneuvers), encoding="utf-8")
     sys.stderr.write(f"wrote {PAGE.name} and {len(SHOWN)} pictures in {PICTURES}\n")
     return 0
 

@@ -73,6 +73,8 @@ def test_readme_states_every_total() -> None:
     sums = GENERATOR.totals(GENERATOR.read())
     for price, weight in sums.values():
         assert f"{price:.2f} USD, {weight:.0f} g" in said
+    weights = ", ".join(f"{weight:.0f}" for _, weight in sums.values())
+    assert f"; {weights} g |" in (ROOT / "tests/FIGURES.md").read_text(encoding="utf-8")
     top = (ROOT / "README.md").read_text(encoding="utf-8")
     prices = [f"{sums[kit][0]:.0f}" for kit in GENERATOR.KITS]
     assert "about {} USD, {} with a radio pair, {} ready to fly".format(*prices) in top

@@ -106,7 +106,7 @@ def _wanted(known: dict[str, Channel], names: tuple[str, ...]) -> list[list[str]
     for name in (one for strip in strips for one in strip):
         if name not in known:
             raise UsageError(
-                f"--channels {name}: not measured here{like(name, known)}; there are"
+                f"channel {name}: not measured here{like(name, known)}; there are"
                 f" {', '.join(known)}"
             )
     return strips

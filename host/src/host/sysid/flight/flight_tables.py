@@ -199,8 +199,8 @@ def _refuse_unusable(
             f"argument mapping {name} has these columns; " for name in maps_for(found.columns)
         ]
         raise IdentificationError(
-            f"{called}: no column t_s; {''.join(fitting)}name it in a map (argument mapping), such"
-            ' as `t_s = { from = "TimeUS", unit = "us" }` below a line [columns]; '
+            f"{called}: no column t_s; {''.join(fitting)}name it in a map (--map; in Python"
+            ' mapping=), such as `t_s = { from = "TimeUS", unit = "us" }` below a line [columns]; '
             + listed(found.columns, found.unusable)
         )
     both = [k for k in used if k in found.twice and k not in theirs]
