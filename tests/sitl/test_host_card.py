@@ -48,6 +48,48 @@ def test_a_card_is_written_committed_and_read_back(bench: Bench, card: bytes) ->
         console.read()
 
 
+HOLD = {
+    "model": b"ultrastick25e", "model_date": 20261128, "angle_gain": [2699, -3162],
+    "integral_gain": [286, -339], "rate_gain": [174, -149], "authority_us": [58, 40],
+}  # fmt: skip
+
+
+def test_a_card_that_holds_is_written_with_its_gains(bench: Bench, card: bytes) -> None:
+    """The largest there is beside it: 32 rows."""
+    line = SitlLine(bench.sitl)
+    console = CardConsole(line, line.now_s)
+    name = read_card(card).head["aircraft"]
+    rows = [DOUBLET | {"axes": 2 | 16}] * 32
+    holding = card_bytes(HEAD | {"aircraft": name}, rows, hold=HOLD)
+    assert card_faults(holding) == []
+    assert console.write(holding) == read_card(holding).hash
+    assert console.read() == holding
+    console.must("erase")
+
+
+@pytest.mark.parametrize(
+    ("hold", "axes", "fault"),
+    [
+        (HOLD | {"angle_gain": [0, -3162]}, 2 | 16, "hold"),
+        (HOLD | {"rate_gain": [-174, -149]}, 2 | 16, "hold"),
+        (HOLD | {"authority_us": [121, 40]}, 2 | 16, "hold"),
+        (None, 2 | 16, "row_hold"),
+        (HOLD, 2 | 32, "row_hold"),
+        (HOLD, 2 | 64, "row_hold"),
+    ],
+)
+def test_host_and_logger_refuse_the_same_holds(
+    bench: Bench, card: bytes, hold: dict[str, object] | None, axes: int, fault: str
+) -> None:
+    line = SitlLine(bench.sitl)
+    console = CardConsole(line, line.now_s)
+    name = read_card(card).head["aircraft"]
+    wrong = card_bytes({**HEAD, "aircraft": name}, [{**DOUBLET, "axes": axes}], hold=hold)
+    assert card_faults(wrong)
+    with pytest.raises(CardError, match=rf"damaged \({fault}\)"):
+        console.write(wrong)
+
+
 @pytest.mark.parametrize(
     ("head", "row", "fault"),
     [
