@@ -68,7 +68,7 @@ class Kernel(Generic[Arguments, Result]):
             self._run = self.machine(said=True)
         elif self._run is None:
             self._run = self.function
-            _say_slow()
+            say_if_slow()
         try:
             result: Result = self._run(*arguments, **named)
         except Exception:
@@ -159,6 +159,13 @@ def prefer_machine_code() -> None:
 def has_compiler() -> bool:
     """Return whether numba is installed."""
     return importlib.util.find_spec("numba") is not None
+
+
+@functools.cache
+def say_if_slow() -> None:
+    """Say once, where numba is not installed, how long loops take and what helps."""
+    if not has_compiler():
+        _say(f"without numba this takes {SLOWER} times as long: {install_hint('numba')}")
 
 
 def compiling_s(kernel: Kernel[..., Any]) -> float:
@@ -331,11 +338,6 @@ def _all_of(kernel: Kernel[..., Any]) -> set[Kernel[..., Any]]:
     for _, part in _called(kernel.function):
         found |= _all_of(part)
     return found
-
-
-@functools.cache
-def _say_slow() -> None:
-    _say(f"without numba this takes {SLOWER} times as long: {install_hint('numba')}")
 
 
 def _say_compiling(name: str, takes_s: float) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Self
 
+from host.compiled import say_if_slow
 from host.live.live_sources import Tell, silence
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.outcome.virtual_calibration import calibration
@@ -58,6 +59,7 @@ class SimulatedSource:
             If the card cannot be flown, the flight card is not of it, or there is no recorder.
         """
         card = cards.load(self.card)
+        say_if_slow()
         recorder_library()
         tell(f"flying {self.card}")
         if self.flight_card:

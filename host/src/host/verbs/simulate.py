@@ -77,9 +77,11 @@ def run(args: argparse.Namespace) -> int:
     if args.seed < 0:
         raise UsageError(f"seed is {args.seed}, expected 0 or more")
     from host.aircraft.origin import announce_aircraft
+    from host.compiled import say_if_slow
     from host.planning.identified_aircraft import is_model, named_aircraft
     from host.wire.flight_card import card_file
 
+    say_if_slow()  # before the recorder is built
     if args.firmware == "sitl":
         recorder_library(draw_share)
     try:
