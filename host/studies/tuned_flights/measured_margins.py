@@ -12,8 +12,8 @@ from host.aircraft.trim import Trim
 from host.arrays import Array
 from host.control.actuator import PULSE_PERIOD_S
 from host.control.lateral_pair import PairScenarios, pair_system
-from host.control.margins import Margins, margins
-from host.control.plant import continuous, sampled
+from host.control.margins import Margins, Spectra, margins
+from host.control.plant import Plant, continuous, sampled
 from host.control.scenarios import law_response
 
 from studies.tuned_flights.closed_loop_flight import SENSE, ClosedLoop, Demand, fly
@@ -76,8 +76,9 @@ def computed(loop: ClosedLoop, axis: str) -> Margins:
     # As far as sines were injected: beyond it nothing was measured.
     w = np.geomspace(2.0 * math.pi * LOWEST_HZ, 2.0 * math.pi * HIGHEST_HZ, 400)
     w = w[w < 0.98 * np.pi / own.period_s]
-    # A law as slow as the pulses waits for the next; a faster one is held by half a pulse more.
-    delay_s = loop.pulse_s if own.period_s >= PULSE_PERIOD_S else 0.5 * PULSE_PERIOD_S
+    # A law as slow as the pulses waits for the next; of a faster one pulses hold what they meet.
+    pulsed = own.period_s < PULSE_PERIOD_S
+    delay_s = 0.0 if pulsed else loop.pulse_s
     servo_hz = loop.frame.servo_bandwidth_radps / (2.0 * math.pi)
     if loop.pair is not None and axis != "pitch":
         drives = np.array([[loop.full_travel_rad(one), servo_hz] for one in ("roll", "yaw")])
@@ -85,7 +86,7 @@ def computed(loop: ClosedLoop, axis: str) -> Margins:
             _by_sideslip(linear, loop.trim), drives, (SENSE["roll"], SENSE["yaw"]),
             law.gyro_filter_hz,
         )  # fmt: skip
-        plant = sampled(system, delay_s, own.period_s)
+        plant = _flown(sampled(system, delay_s, own.period_s), pulsed)
         here = replace(loop.pair.roll, airspeeds_mps=(loop.trim.airspeed_mps,))
         no_gusts = np.zeros((1, 1, len(w), 4), dtype=complex)
         seen = PairScenarios(
@@ -100,10 +101,23 @@ def computed(loop: ClosedLoop, axis: str) -> Margins:
     )
     travel_rad = loop.full_travel_rad(axis)
     system = continuous(axis, dynamics, travel_rad, servo_hz, law.gyro_filter_hz, SENSE[axis])
-    plant = sampled(system, delay_s, own.period_s)
+    plant = _flown(sampled(system, delay_s, own.period_s), pulsed)
     by_angle, by_rate = law_response(own, w)
     response = plant.response(w)
     return margins(-(by_angle * response[:, 0] + by_rate * response[:, 1])[None], w)
+
+
+class _Pulsed(Plant):
+    """A plant whose input is held from pulse to pulse in place of step to step."""
+
+    def transfer(self, frequency_radps: Array) -> Spectra:
+        s = 1j * frequency_radps
+        longer, usual = ((1.0 - np.exp(-s * t)) / t for t in (PULSE_PERIOD_S, self.period_s))
+        return np.asarray((longer / usual)[:, None, None] * super().transfer(frequency_radps))
+
+
+def _flown(plant: Plant, pulsed: bool) -> Plant:
+    return _Pulsed(plant.a, plant.b, plant.c, plant.period_s) if pulsed else plant
 
 
 def _by_sideslip(linear: Linear, trim: Trim) -> tuple[Array, Array, tuple[str, ...]]:
