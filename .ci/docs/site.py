@@ -19,8 +19,14 @@ PAGES, SITE, VENV = OUT / "pages", OUT / "site", OUT / "venv"
 # Where `make setup` left `host`: the notebooks run in it.
 HOST_PYTHON = ROOT / ".venv" / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
 REQUIREMENTS = ROOT / ".ci" / "requirements-docs.txt"
-# The theme breaks no line of a table, and lets the answer of a notebook run over.
-CSS = ".wy-table-responsive table td{white-space:normal} .rst-content div>pre{font-size:80%}"
+# The theme breaks no line of a table, cuts what is wider than 700 pixels, lets text run over.
+CSS = """.wy-table-responsive table td{white-space:normal}
+.wy-nav-content{max-width:1000px}
+.rst-content table.docutils td,.rst-content table.docutils th{padding:4px 6px}
+.rst-content pre{overflow-x:auto}
+.rst-content div>pre{font-size:80%}
+@media(min-width:768px){.rst-content pre,.rst-content pre code{white-space:pre-wrap}}
+"""
 LARGEST = 2_000_000  # bytes of a file that a page links to
 COPIED = (".md", ".svg", ".png", ".jpg", ".toml", ".csv", ".h", ".json", ".html", ".cff", ".txt")
 USERS = (
