@@ -141,7 +141,17 @@ def test_the_doctor_says_what_is_set_and_by_whom(
     assert all(one["install"] for one in found["libraries"] if not one["version"])
     assert main(["doctor"]) == 0
     said = capsys.readouterr().out
-    for word in ("Python", "[parquet]", "compilers", "port", "setting", "HOST_SITL"):
+    for word in (
+        "Python",
+        "[parquet]",
+        "charts",
+        "uPlot",
+        "its licence",
+        "compilers",
+        "port",
+        "setting",
+        "HOST_SITL",
+    ):
         assert word in said
     monkeypatch.setenv("HOST_SITL", os.devnull + "x")
     assert main(["doctor"]) == 0

@@ -21,6 +21,8 @@ _PACKAGE = "uplot"
 _REQUIREMENT = "uplot-python==1.1.1"  # it carries the same uPlot
 _SCRIPT = "uPlot.iife.js"
 _STYLE = "uPlot.min.css"
+_LICENCE = "LICENSE"
+_HEAD_CHARACTERS = 200
 
 
 def chart_script() -> str:
@@ -45,6 +47,27 @@ def chart_style() -> str:
     return _text(_STYLE)
 
 
+def chart_folder() -> Path | None:
+    """Return the folder that holds script and style sheet, None where there is none."""
+    return next(
+        (one for one in _folders() if all((one / name).is_file() for name in (_SCRIPT, _STYLE))),
+        None,
+    )
+
+
+def chart_licence(folder: Path) -> Path | None:
+    """Return uPlot's licence in `folder`: its file, or the script whose head names it."""
+    if (folder / _LICENCE).is_file():
+        return folder / _LICENCE
+    with (folder / _SCRIPT).open(encoding="utf-8") as script:
+        return folder / _SCRIPT if "MIT" in script.read(_HEAD_CHARACTERS) else None
+
+
+def chart_hint() -> str:
+    """Return the command that installs uPlot."""
+    return command_line(sys.executable, "-m", "pip", "install", "--no-deps", _REQUIREMENT)
+
+
 def _folders() -> Iterator[Path]:
     yield from _PLACES
     found = importlib.util.find_spec(_PACKAGE)
@@ -53,8 +76,9 @@ def _folders() -> Iterator[Path]:
 
 
 def _text(name: str) -> str:
-    for folder in _folders():
-        if (folder / name).is_file():
-            return (folder / name).read_text(encoding="utf-8")
-    install = command_line(sys.executable, "-m", "pip", "install", "--no-deps", _REQUIREMENT)
-    raise UsageError(f"a page with charts needs uPlot: {install} (or install npm, and host again)")
+    folder = chart_folder()
+    if folder is None:
+        raise UsageError(
+            f"a page with charts needs uPlot: {chart_hint()} (or install npm, and host again)"
+        )
+    return (folder / name).read_text(encoding="utf-8")

@@ -86,10 +86,11 @@ def add_output(
 ) -> None:
     """Add ``--output N=SURFACE``, and of a verb that writes a file what is to be written."""
     names = ("-o", "--output") if kind else ("--output",)
-    also = f"{about}; or N=SURFACE: " if about else ""
+    both = f"{metavar}: {about}. N=SURFACE: " if about else ""
     parser.set_defaults(outputs=[])
-    parser.add_argument(*names, action=StoreOutput, const=kind, metavar=metavar or "N=SURFACE",
-                        help=f"{also}of an autopilot's log, output N moves this surface, as"
+    parser.add_argument(*names, action=StoreOutput, const=kind,
+                        metavar=f"{metavar}|N=SURFACE" if kind else "N=SURFACE",
+                        help=f"{both}of an autopilot's log, output N moves this surface, as"
                         " 2=elevator, 2=-elevator turned round; repeatable")  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from host.chart_library import chart_folder, chart_hint, chart_licence
 from host.compiled import generated_folders
 from host.errors import HostError
 from host.extras import install_hint
@@ -69,6 +70,7 @@ class Inventory:
     compilers: list[str] = field(default_factory=list)
     ports: list[str] = field(default_factory=list)
     caches: dict[str, int] = field(default_factory=dict)
+    charts: list[str] = field(default_factory=list)
     settings: list[Setting] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
 
@@ -91,6 +93,7 @@ def inventory() -> Inventory:
         "ziglang" if "ziglang" in command else " ".join(command)
         for command in recorder_build.compilers()
     ]
+    found.charts = _charts()
     found.ports = [f"{port.device}  {port.looks_like or port.description}"
                    for port in serial_ports()]  # fmt: skip
     found.caches = {str(place): _size_bytes(place) for place in _caches()}
@@ -120,6 +123,15 @@ def _libraries() -> list[Library]:
         hint = "" if version else install_hint(name)
         found.append(Library(name, extra[1] if extra else "", version, hint))
     return found
+
+
+def _charts() -> list[str]:
+    """Return where uPlot and its licence are, or how to get what is missing."""
+    folder = chart_folder()
+    if folder is None:
+        return ["uPlot missing", chart_hint()]
+    licence = chart_licence(folder)
+    return [f"uPlot {folder}", f"its licence {licence}" if licence else "its licence is missing"]
 
 
 def _caches() -> list[Path]:
@@ -176,6 +188,7 @@ def inventory_lines(found: Inventory) -> list[str]:
         said = ", ".join(f"{one.name} {one.version or 'missing'}" for one in own)
         lines.append(f"{f'[{extra}]' if extra else 'libraries':<13}{said}")
         lines += [f"{'':<13}{one.install}" for one in own if one.install]
+    lines += [f"{'' if k else 'charts':<13}{one}" for k, one in enumerate(found.charts)]
     lines.append(f"{'compilers':<13}{', '.join(found.compilers) or 'none'}")
     lines += [f"{'port':<13}{port}" for port in found.ports] or [f"{'ports':<13}none"]
     lines += [f"{'cache':<13}{path}  {size / 1e6:.1f} MB" for path, size in found.caches.items()]
