@@ -34,6 +34,8 @@ class Check:
         True where a motion is asked for: one such item at a time. Others watch all the time.
     latched : bool
         True if a passed check ignores further rows.
+    hears_always : bool
+        True where a motion is asked for, and slower frames of any time are its answer.
     state : State
     reason : str
         Why it failed; while it waits, the progress so far.
@@ -43,6 +45,7 @@ class Check:
 
     asked = False
     latched = False
+    hears_always = False
     limits_of = ""
 
     def __init__(self, key: str, title: str, step: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from host.aircraft.file import Aircraft, load_measured, read_document
 from host.aircraft.linear_aircraft import load
@@ -13,6 +14,7 @@ from host.near_names import like
 from host.physical.calibration import Calibration
 from host.preflight.check import Check
 from host.preflight.failsafe_check import FailsafeCheck
+from host.preflight.hold_check import HoldCheck, held_surfaces
 from host.preflight.load_checks import RadioCheck, SupplyCheck
 from host.preflight.logger_checks import CardCheck, LoggerCheck, ReceiverCheck
 from host.preflight.outside_checks import BaroCheck, GpsCheck
@@ -23,10 +25,12 @@ from host.preflight.still_checks import GyroZeroCheck, ImuCheck, RestPressureChe
 from host.preflight.surface_check import SURFACES, SurfaceCheck
 from host.preflight.turn_check import TurnCheck
 from host.preflight.vane_check import VANES, VaneCheck
+from host.wire.flight_card import CardFile, card_faults, card_file, read_card
 
 ITEMS = (
     *("logger", "receiver", "imu", "gyros", "airspeed_rest", "baro", "gps", "card"),
-    *("imu_turned", *VANES, "dp_a", "dp_b", *SURFACES, "supply", "relay", "failsafe", "radio"),
+    *("imu_turned", *VANES, "dp_a", "dp_b", *SURFACES, "supply", "relay", "failsafe"),
+    *("radio", "hold"),
 )
 PARTS = {
     "vanes": tuple(VANES),
@@ -48,6 +52,8 @@ class CheckListInputs:
         Items or parts left out, and why; they stand on the sheet.
     by_wire : bool
         The source is the USB line, not the radio.
+    flight_card : CardFile or None
+        The logger's; the hold is looked at where a row holds.
     """
 
     aircraft: Aircraft
@@ -55,6 +61,7 @@ class CheckListInputs:
     settings: PilotSettings = field(default_factory=PilotSettings)
     without: Mapping[str, str] = field(default_factory=dict)
     by_wire: bool = False
+    flight_card: CardFile | None = None
 
 
 def checked_aircraft(source: str) -> Aircraft:
@@ -69,6 +76,22 @@ def checked_aircraft(source: str) -> Aircraft:
     """
     measured = read_document(source).get("kind") == "measured"
     return load_measured(source) if measured else load(source)
+
+
+def good_card(path: Path | None) -> CardFile | None:
+    """Read the logger's flight card; None without one.
+
+    Raises
+    ------
+    UsageError
+        No such file, or no good card.
+    """
+    if path is None:
+        return None
+    data = card_file(path)
+    for wrong in card_faults(data):
+        raise UsageError(f"{path}: {wrong}")
+    return read_card(data)
 
 
 def check_list(wanted: CheckListInputs) -> list[Check]:
@@ -90,12 +113,20 @@ def check_list(wanted: CheckListInputs) -> list[Check]:
         *(PitotCheck(side, "".join(one for one in sides if one != side)) for side in sides),
         *(surface_check(wanted, surface) for surface in SURFACES),
         SupplyCheck(), RelayCheck(settings),
-        FailsafeCheck(settings), RadioCheck(by_wire=wanted.by_wire),
+        FailsafeCheck(settings), RadioCheck(by_wire=wanted.by_wire), *hold_checks(wanted),
     ]  # fmt: skip
     kept = [check for check in checks if check.key not in out]
     for check in kept:
         check.begin()
     return kept
+
+
+def hold_checks(wanted: CheckListInputs) -> list[HoldCheck]:
+    """Return the check of the hold, none where no row of the card holds."""
+    card = wanted.flight_card
+    if card is None or not held_surfaces(card):
+        return []
+    return [HoldCheck(card, by_wire=wanted.by_wire)]
 
 
 def surface_check(wanted: CheckListInputs, surface: str) -> SurfaceCheck:

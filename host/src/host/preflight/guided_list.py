@@ -47,6 +47,7 @@ class Preflight:
         self.wanted = wanted
         self.checks = check_list(wanted)
         self._watching = [check for check in self.checks if not check.asked]
+        self._hearing = [c for c in self.checks if c.hears_always or not c.asked]
         self.asked: Check | None = None
         self.ended = False
         self.logger: dict[str, Any] = {}
@@ -79,14 +80,15 @@ class Preflight:
                 self._changed(check)
 
     def _hear(self, reading: SlowReading) -> None:
-        """Hand a slower frame to all that watch, and to the motion asked for."""
+        """Hand a slower frame to all that hear it, and to the motion asked for."""
         self.wanted.settings.take_reading(reading)
         if reading.name in ("identity", "status"):
             self.logger = reading.said
-        for check in self._watching:
+        for check in self._hearing:
             check.take_reading(reading)
         if self.asked is not None:
-            self.asked.take_reading(reading)
+            if not self.asked.hears_always:
+                self.asked.take_reading(reading)
             self._decided(reading.t_s)
 
     def _look(self, sample: Sample) -> None:

@@ -17,7 +17,7 @@ from host.live.live_request import LiveRequest
 from host.live.live_session import LiveSession
 from host.physical.calibration import Calibration
 from host.preflight.check import Check, State
-from host.preflight.check_list import CheckListInputs, checked_aircraft, left_out
+from host.preflight.check_list import CheckListInputs, checked_aircraft, good_card, left_out
 from host.preflight.guided_list import Preflight
 from host.preflight.preflight_screen import PreflightScreen
 from host.preflight.preflight_sheet import SUFFIX, sheet_document, write_sheet
@@ -42,6 +42,8 @@ class PreflightRequest:
     sheet : Path or None
         Beside the capture, or in the working folder, without it.
     as_json : bool
+    flight_card : Path or None
+        The logger's card: its hold is looked at.
     """
 
     live: LiveRequest
@@ -50,6 +52,7 @@ class PreflightRequest:
     without: dict[str, str] = field(default_factory=dict)
     sheet: Path | None = None
     as_json: bool = False
+    flight_card: Path | None = None
 
 
 @dataclass(slots=True)
@@ -87,6 +90,7 @@ def run_preflight(
     """
     left_out(request.without)
     aircraft = checked_aircraft(request.aircraft)
+    card = good_card(request.flight_card)
     live = request.live
     if live.source is not None and live.source.startswith(SIMULATED):
         from host.preflight.walk_source import walk_source
@@ -96,7 +100,9 @@ def run_preflight(
 
     def join(session: LiveSession, calibration: Calibration) -> Callable[[], None]:
         by_wire = session.source.baud == BAUD
-        wanted = CheckListInputs(aircraft, calibration, without=request.without, by_wire=by_wire)
+        wanted = CheckListInputs(
+            aircraft, calibration, without=request.without, by_wire=by_wire, flight_card=card
+        )
         walk = _Walk(request, session, wanted, screen)
         done.append(walk)
         if keys is not None:

@@ -40,6 +40,12 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--without", action="append", default=[], metavar="ITEM[=WHY]",
                         help="leave an item out (not fitted); it stands on the sheet; vanes,"
                         " pitots, pots: all of them")  # fmt: skip
+    parser.add_argument(
+        "--flight-card",
+        type=Path,
+        metavar="FILE",
+        help="the logger's card: asks for the proof of its hold, if it holds",
+    )
     parser.add_argument("--list", action="store_true", help="print the checks, and stop")
     parser.add_argument("--sheet", type=Path, metavar="TOML",
                         help="sheet to write (default: beside the capture)")  # fmt: skip
@@ -73,7 +79,9 @@ def run(args: argparse.Namespace) -> int:
         source=args.source, output=args.output, baud=args.baud, calibration=args.calibration,
         port=args.port, lan=args.lan, page=not args.no_page, mavlink=args.mavlink, seed=args.seed,
     )  # fmt: skip
-    request = PreflightRequest(live, aircraft, args.by, without, args.sheet, args.json)
+    request = PreflightRequest(
+        live, aircraft, args.by, without, args.sheet, args.json, args.flight_card
+    )
     screen = PreflightScreen(as_json=args.json, show=lambda line: print(line, flush=True))
     summary = run_preflight(request, screen, typed_line if sys.stdin.isatty() else None)
     if sys.stderr.isatty():
@@ -109,10 +117,11 @@ def _list(args: argparse.Namespace, aircraft: str, without: dict[str, str]) -> i
 
     from host.errors import ExitCode
     from host.physical.calibration import load_calibration
-    from host.preflight.check_list import CheckListInputs, check_list, checked_aircraft
+    from host.preflight.check_list import CheckListInputs, check_list, checked_aircraft, good_card
 
     plane, lines = checked_aircraft(aircraft), load_calibration(args.calibration)
-    wanted = CheckListInputs(plane, lines, without=without)
+    card = good_card(args.flight_card)
+    wanted = CheckListInputs(plane, lines, without=without, flight_card=card)
     checks = check_list(wanted)
     if args.json:
         print(json.dumps([{"item": c.key, "title": c.title, "step": c.step} for c in checks]))
