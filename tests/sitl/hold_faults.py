@@ -1,21 +1,26 @@
 """Random flights whose rows hold bank and pitch, in one loop with an aircraft, faults on top.
 
     python tests/sitl/hold_faults.py --flights 200 --each 10 --seed 49
+    python tests/sitl/hold_faults.py --kinds late,biased --each 50 --first 50
+
+A flight is drawn from seed and number alone: the same numbers of another kind are the same flights
+with another fault, and a campaign runs in pieces.
 
 Gusts up to 2 m/s, CG 3 % of the chord either way, servos at half their speed in every second
 flight, each surface with half to twice the effect that the model has. Judged from true motion,
 servo pulses and what was sent: plain pulses within 25 ms of what could be known, bank at most 60
 degrees for half a second behind a row, and nothing lost that is kept without the hold.
-Ends with a table; 6 if anything was wrong.
+Each kind's line is printed as it ends or is stopped; 6 if anything was wrong.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import signal
 import sys
 import tempfile
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -190,6 +195,11 @@ FAULTS: tuple[Draw, ...] = (
     reversed_surface, turned, turned_before, frozen, silent, late, biased, pitot, barometer,
     receiver, brown_out,
 )  # fmt: skip
+KINDS: tuple[Draw, ...] = (nothing, *FAULTS)
+HEAD = """\
+| fault | flights | begun | most bank in the row, 0.5 s behind it, deg \
+| plain behind what is known, ms | ends | wrong |
+| --- | --- | --- | --- | --- | --- | --- |"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -334,41 +344,84 @@ def _motion(motion: Motion, end_s: float) -> tuple[float, float, bool]:
     )
 
 
+def table_row(name: str, flights: list[Flown]) -> str:
+    """Return the line of one kind."""
+    begun = [f for f in flights if f.begun]
+    bank = max((f.bank_deg for f in begun), default=0.0)
+    behind = max((f.behind_deg for f in begun), default=0.0)
+    last = max((f.plain_s for f in flights if f.plain_s is not None), default=None)
+    ends = ", ".join(f"{why} {n}" for why, n in Counter(f.reason for f in flights).most_common())
+    said = "-" if last is None else f"{1000 * last:.1f}"
+    wrong = sum(bool(f.wrong) for f in flights)
+    return (
+        f"| {name} | {len(flights)} | {len(begun)} | {bank:.0f}, {behind:.0f} | {said} |"
+        f" {ends} | {wrong} |"
+    )
+
+
+def fly_kind(draw: Draw, numbers: range, seed: int) -> list[Flown]:
+    """Fly one kind and print its line, of what was flown also if it is stopped.
+
+    Raises
+    ------
+    StoppedError
+        By a signal; the line stands.
+    """
+    flights: list[Flown] = []
+    try:
+        for number in numbers:
+            flown = fly(number, seed, draw)
+            flights.append(flown)
+            for line in flown.wrong[:3]:
+                print(f"{draw.__name__} {number}: {line}", file=sys.stderr, flush=True)
+    except StoppedError:
+        go_on = numbers.start + len(flights)
+        print(f"stopped: --kinds {draw.__name__} --first {go_on} goes on", file=sys.stderr)
+        raise
+    finally:
+        if flights:
+            print(table_row(flights[0].fault, flights), flush=True)
+    return flights
+
+
+class StoppedError(Exception):
+    """A signal asked for the end."""
+
+
+def _stop(number: int, frame: object) -> None:
+    raise StoppedError(number)
+
+
+def _kinds(text: str) -> list[Draw]:
+    known = {draw.__name__: draw for draw in KINDS}
+    unknown = [name for name in text.split(",") if name not in known]
+    if unknown:
+        raise argparse.ArgumentTypeError(f"no kind {unknown[0]}; known: {', '.join(known)}")
+    return [known[name] for name in text.split(",")]
+
+
 def main() -> int:
-    """Fly, print the table, return the exit code."""
+    """Fly, print the table line by line, return the exit code."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--flights", type=int, default=2000, help="without a fault")
     parser.add_argument("--each", type=int, default=100, help="of each fault")
     parser.add_argument("--seed", type=int, default=49)
+    parser.add_argument("--first", type=int, default=0, help="number of each kind's first flight")
+    parser.add_argument("--kinds", type=_kinds, default=KINDS,
+                        help="with commas: " + ", ".join(d.__name__ for d in KINDS))  # fmt: skip
     options = parser.parse_args()
-    plan = [nothing] * options.flights + [f for f in FAULTS for _ in range(options.each)]
-    rows: dict[str, list[Flown]] = defaultdict(list)
-    bad = 0
-    for number, draw in enumerate(plan):
-        flown = fly(number, options.seed, draw)
-        rows[flown.fault].append(flown)
-        for line in flown.wrong[:3]:
-            print(f"flight {number}: {line}", file=sys.stderr, flush=True)
-        bad += bool(flown.wrong)
-    print(
-        "| fault | flights | begun | most bank in the row, 0.5 s behind it, deg"
-        " | plain behind what is known, ms | ends | wrong |"
-    )
-    print("| --- | --- | --- | --- | --- | --- | --- |")
-    for name, flights in rows.items():
-        flown_rows = [f for f in flights if f.begun]
-        bank = max((f.bank_deg for f in flown_rows), default=0.0)
-        behind = max((f.behind_deg for f in flown_rows), default=0.0)
-        last = max((f.plain_s for f in flights if f.plain_s is not None), default=None)
-        ends = ", ".join(
-            f"{why} {n}" for why, n in Counter(f.reason for f in flights).most_common()
-        )
-        said = "-" if last is None else f"{1000 * last:.1f}"
-        wrong = sum(bool(f.wrong) for f in flights)
-        print(
-            f"| {name} | {len(flights)} | {len(flown_rows)} | {bank:.0f}, {behind:.0f} | {said} |"
-            f" {ends} | {wrong} |"
-        )
+    for one in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(one, _stop)
+    print(HEAD, flush=True)
+    bad = False
+    try:
+        for draw in options.kinds:
+            count = options.flights if draw is nothing else options.each
+            numbers = range(options.first, options.first + count)
+            flights = fly_kind(draw, numbers, options.seed)
+            bad = bad or any(f.wrong for f in flights)
+    except StoppedError as stop:
+        return 128 + int(stop.args[0])
     return 6 if bad else 0
 
 

@@ -15,8 +15,9 @@ from host.wire.flight_card import card_faults, read_card
 from host.wire.schema_text import packed_schema
 
 from tests.sitl import flight_cards as cards
+from tests.sitl import hold_faults
 from tests.sitl.bench import Bench
-from tests.sitl.hold_faults import FAULTS, ROWS, fly, nothing
+from tests.sitl.hold_faults import FAULTS, ROWS, Draw, Flown, StoppedError, fly, main, nothing
 from tests.sitl.hold_flight import (
     PITCHED_S,
     SHOWN_S,
@@ -175,3 +176,32 @@ def test_a_stick_that_moved_while_it_was_armed_refuses_the_row(tmp_path: Path) -
 def test_a_drawn_flight_is_flown_as_the_campaign_asks(draw: object) -> None:
     for number in range(len(ROWS)):
         assert fly(number, SEED, draw).wrong == ()  # type: ignore[arg-type]
+
+
+def test_a_campaign_runs_in_pieces_and_keeps_what_it_had(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    flown_ones: list[tuple[str, int]] = []
+
+    def flown_until_killed(number: int, seed: int, draw: Draw) -> Flown:
+        if draw.__name__ == "late" and number == 9:
+            raise StoppedError(15)
+        flown_ones.append((draw.__name__, number))
+        wrong = ("lost",) if number == 8 and draw.__name__ == "frozen" else ()
+        return Flown(draw.__name__, wrong, True, "done", 10.0, 5.0, None)
+
+    monkeypatch.setattr(hold_faults, "fly", flown_until_killed)
+    monkeypatch.setattr("signal.signal", lambda *_: None)
+    asked = "--kinds frozen,late,biased --each 3 --first 7"
+    monkeypatch.setattr("sys.argv", ["hold_faults.py", *asked.split()])
+    assert main() == 128 + 15
+    assert flown_ones == [("frozen", n) for n in (7, 8, 9)] + [("late", n) for n in (7, 8)]
+    said = capsys.readouterr()
+    lines = said.out.splitlines()[2:]
+    assert [line.split(" | ")[:3] for line in lines] == [
+        ["| frozen", "3", "3"],
+        ["| late", "2", "2"],
+    ]
+    assert lines[0].endswith("| 1 |")
+    assert "frozen 8: lost" in said.err
+    assert "--kinds late --first 9 goes on" in said.err
