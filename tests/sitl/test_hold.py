@@ -17,7 +17,24 @@ from host.wire.schema_text import packed_schema
 from tests.sitl import flight_cards as cards
 from tests.sitl import hold_faults
 from tests.sitl.bench import Bench
-from tests.sitl.hold_faults import FAULTS, ROWS, Draw, Flown, StoppedError, fly, main, nothing
+from tests.sitl.hold_faults import (
+    BANK_END,
+    KINDS,
+    MOST_BANK_DEG,
+    ROWS,
+    Draw,
+    Flown,
+    StoppedError,
+    biased,
+    fly,
+    frozen,
+    late,
+    main,
+    reversed_surface,
+    silent,
+    turned,
+    turned_before,
+)
 from tests.sitl.hold_flight import (
     PITCHED_S,
     SHOWN_S,
@@ -35,6 +52,8 @@ SEED = 49_000
 ROW = cards.row(shape=cards.THREE_TWO_ONE_ONE, axes=4 | 3 << 4, quiet_ms=200, duration_ms=3500,
                 amplitude_us=(0, 0, 80))  # fmt: skip
 CARD = cards.card([ROW], hold=cards.HOLD)
+# Their tests say how the row ends.
+NAMED = (reversed_surface, turned, turned_before, frozen, silent, late, biased)
 
 
 def calm() -> InputFlight:
@@ -172,10 +191,46 @@ def test_a_stick_that_moved_while_it_was_armed_refuses_the_row(tmp_path: Path) -
     assert why_refused(events(bench, tmp_path)) == END["stick"]
 
 
-@pytest.mark.parametrize("draw", [nothing, *FAULTS], ids=lambda draw: draw.__name__)
-def test_a_drawn_flight_is_flown_as_the_campaign_asks(draw: object) -> None:
-    for number in range(len(ROWS)):
-        assert fly(number, SEED, draw).wrong == ()  # type: ignore[arg-type]
+def of_each_row(draw: Draw) -> list[Flown]:
+    """Fly each shape with a fault; nothing may be wrong, as the campaign asks."""
+    found = [fly(number, SEED, draw) for number in range(len(ROWS))]
+    assert [f.wrong for f in found] == [()] * len(ROWS)
+    return found
+
+
+@pytest.mark.parametrize(
+    "draw", [draw for draw in KINDS if draw not in NAMED], ids=lambda draw: draw.__name__
+)
+def test_a_drawn_flight_is_flown_as_the_campaign_asks(draw: Draw) -> None:
+    of_each_row(draw)
+
+
+@pytest.mark.parametrize("draw", [reversed_surface, turned], ids=lambda draw: draw.__name__)
+def test_a_surface_or_imu_turned_round_behind_the_proof_ends_the_row(draw: Draw) -> None:
+    for one in of_each_row(draw):
+        assert one.begun
+        assert one.reason in ("bank", "pitch", "hold_loses")
+        assert one.bank_deg <= BANK_END / 100
+        assert one.behind_deg <= MOST_BANK_DEG
+
+
+def test_an_imu_turned_before_the_proof_starts_no_row() -> None:
+    assert [(f.begun, f.reason) for f in of_each_row(turned_before)] == [(False, "hold_sense")] * 4
+
+
+def test_an_imu_that_freezes_or_falls_silent_ends_the_row() -> None:
+    # The last one freezes 0.5 s before its row is over.
+    reasons = [f.reason for f in of_each_row(frozen)]
+    assert reasons == ["sensor_still"] * 3 + ["done"]
+    assert {f.reason for f in of_each_row(silent)} == {"sensor_lost"}
+
+
+@pytest.mark.parametrize("draw", [late, biased], ids=lambda draw: draw.__name__)
+def test_an_imu_late_or_off_by_5_deg_stays_within_the_holds_bounds(draw: Draw) -> None:
+    """Nothing tells, so the row goes on."""
+    for one in of_each_row(draw):
+        assert one.reason == "done"
+        assert max(one.bank_deg, one.behind_deg) < BANK_END / 100
 
 
 def test_a_campaign_runs_in_pieces_and_keeps_what_it_had(
