@@ -1,12 +1,20 @@
 """Distance and bearing home, and the warning before the limit, against motion step by step."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from host.aircraft.linear_aircraft import load as load_aircraft
 from host.live.flight_state import FlightState
 from host.live.gps_fix import GpsFix
 from host.live.home_limit import WARNED_S, home_view
+from host.live.live_program import _limit_m
+from host.live.live_request import LiveRequest
 from host.live.live_stream import LiveStream
 from host.physical.calibration import load_calibration
+from host.planning.card_design import design
+from host.planning.flight_envelope import Envelope
+from host.planning.logger_card import logger_card
 
 from tests.host.live.test_flight_state import flown
 
@@ -53,3 +61,13 @@ def test_the_state_says_it_once_as_an_event_each_time_it_leaves() -> None:
     assert state.as_json()["home"]["distance_m"] == pytest.approx(270.0, abs=1.0)
     said = [event["text"] for event in state.events if event["kind"] == "warning"]
     assert said == [f"{m} m from home, outside 250 m: turn home" for m in (260, 270)]
+
+
+def test_a_flight_card_that_watches_no_distance_leaves_the_usual_limit(tmp_path: Path) -> None:
+    plane = load_aircraft("ultrastick25e")
+    for asked_m, limit_m in ((0, 300.0), (200, 200.0)):
+        file = tmp_path / f"{asked_m}.card"
+        around = Envelope(distance_m=asked_m)
+        file.write_bytes(logger_card(design("ultrastick25e"), plane, load_calibration(), around))
+        assert _limit_m(LiveRequest(flight_card=file)) == limit_m
+    assert _limit_m(LiveRequest()) == 300.0
