@@ -102,6 +102,9 @@ def test_over_usb_it_says_where_to_look() -> None:
     assert "the radio's port" in check.reason
     check.take_reading(SlowReading("system", 1.0, {"uptime_s": None}))
     assert check.state == "failed"
+    replayed = HoldCheck(read_card(card()), by_wire=False)
+    replayed.take_reading(SlowReading("system", 1.0, {"uptime_s": None}))
+    assert replayed.state == "waiting"
 
 
 def test_a_card_that_holds_nothing_has_no_such_item(tmp_path: Path) -> None:

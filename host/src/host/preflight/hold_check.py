@@ -58,7 +58,7 @@ class HoldCheck(AskedCheck):
     def take_reading(self, reading: SlowReading) -> None:
         """Take an event; a time since power-on that went back is a reset."""
         said = reading.said
-        if reading.name == "system" and not self._by_wire:
+        if reading.name == "system" and said["uptime_s"] is not None:  # a status line has none
             uptime_s = said["uptime_s"]
             if uptime_s < self._uptime_s:
                 self._forget()
