@@ -89,10 +89,13 @@ def card(
     rows: Sequence[bytes],
     axes: Sequence[AxisCard] = (),
     axis_of_row: Sequence[int] = (),
-    hold: dict[str, Any] | None = None,
+    hold: Any = None,
     **changed: Any,
 ) -> bytes:
-    """Return a whole card with its hash; `axis_of_row` counts `axes` from 1, 0 is none."""
+    """Return a whole card with its hash; `axis_of_row` counts `axes` from 1, 0 is none.
+
+    `hold` are values as `HOLD`, if it holds; untyped, since callers spread dicts of numbers.
+    """
     counts = {"rows": len(rows), "learned_axes": len(axes), "hold": int(hold is not None)}
     head = _packed("card_head", HEAD | counts | changed)[:-4]
     rest = _packed("card_learning", {"axis_of_row": axis_of_row or (0,)})

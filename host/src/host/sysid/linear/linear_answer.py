@@ -18,11 +18,8 @@ if TYPE_CHECKING:
     from host.sysid.estimators.servo_parameters import ServoEstimate
     from host.sysid.flight.column_change import Record
     from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
-    from host.sysid.models.diagnostics import (
-        Collinearity,
-        IdentifiabilityFlag,
-        SignalFit,
-    )
+    from host.sysid.models.collinearity import Collinearity
+    from host.sysid.models.diagnostics import IdentifiabilityFlag, SignalFit
     from host.sysid.models.fit_result import FitResult
     from host.sysid.models.maneuver import Maneuver
     from host.sysid.models.modal_analysis import Mode
