@@ -20,8 +20,9 @@ void add_bytes(core::Crc32* crc, uint16_t address, uint16_t size) {
 bool hash_holds(const CardHead& head) {
   core::Crc32 crc;
   crc.add(&head, core::kCardFieldsBytes);
-  const uint8_t parts = static_cast<uint8_t>(frames::kCardHeadParts - 2U + head.rows +
-                                             frames::kCardAxisParts * head.learned_axes + head.hold);
+  const uint8_t parts =
+      static_cast<uint8_t>(frames::kCardHeadParts - 2U + head.rows +
+                           frames::kCardAxisParts * head.learned_axes + head.hold);
   add_bytes(&crc, card_part_address(2), static_cast<uint16_t>(parts * frames::kCardPartBytes));
   return head.crc != 0 && crc.value() == head.crc;
 }

@@ -254,9 +254,9 @@ void TestInputs::see(const Sensors& sensors, InputMemory& memory, uint32_t now_u
     watch.motion.see_imu(in, now_us);
     watch.found[InputWatch::kImu] = core::judge_imu(watch.limits, in);
     if (memory_->holds) {
-      watch.found[InputWatch::kHold] =
-          command_.running() ? memory_->hold.step(in, memory.applied_ticks, now_us)
-                             : memory_->hold.may_start(in);
+      watch.found[InputWatch::kHold] = command_.running()
+                                           ? memory_->hold.step(in, memory.applied_ticks, now_us)
+                                           : memory_->hold.may_start(in);
     }
   }
   const uint16_t baro_us = static_cast<uint16_t>(sensors.baro().t_us);

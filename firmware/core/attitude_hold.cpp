@@ -7,7 +7,7 @@ namespace {
 
 using frames::InputEnd;
 
-constexpr uint8_t kSumShift = 2;        // 20 errors of 6000 stay within 16 bits
+constexpr uint8_t kSumShift = 2;         // 20 errors of 6000 stay within 16 bits
 constexpr uint16_t kMostStepUs = 15000;  // a sample that came late moves no further than this long
 constexpr uint8_t kTicks = 2;            // per us
 
@@ -76,9 +76,7 @@ bool HeldAxis::loses(int16_t applied_ticks) {
   return grown_ >= kMostSpans;
 }
 
-void AttitudeHold::load(const frames::CardHoldLayout& card,
-                        uint8_t held,
-                        uint16_t rate_max_usps) {
+void AttitudeHold::load(const frames::CardHoldLayout& card, uint8_t held, uint16_t rate_max_usps) {
   for (uint8_t axis = 0; axis < kHeldAxes; ++axis) axes_[axis].load(card, axis);
   rate_max_usps_ = rate_max_usps;
   held_ = held;
@@ -126,8 +124,7 @@ InputEnd AttitudeHold::step(const InputReadings& in, int16_t* applied_ticks, uin
   InputEnd why = InputEnd::kDone;
   for (uint8_t axis = 0; axis < kHeldAxes; ++axis) {
     if (!holds(axis)) continue;
-    const int16_t wanted =
-        axes_[axis].demand(axis == kAileron ? in.phi : in.theta, in.rates[axis]);
+    const int16_t wanted = axes_[axis].demand(axis == kAileron ? in.phi : in.theta, in.rates[axis]);
     applied_ticks[axis] = towards(applied_ticks[axis], wanted, most);
     if (axes_[axis].loses(applied_ticks[axis])) why = InputEnd::kHoldLoses;
   }

@@ -12,9 +12,8 @@ using CardHead = frames::CardHeadLayout;
 using CardRow = frames::CardRowLayout;
 
 constexpr uint8_t kCardAxes = 3;  // aileron, elevator, rudder: the servos but the throttle
-constexpr uint8_t kCardParts =
-    frames::kCardHeadParts + frames::kCardMostRows +
-    frames::kCardMostAxes * frames::kCardAxisParts + 1;  // card_hold
+constexpr uint8_t kCardParts = frames::kCardHeadParts + frames::kCardMostRows +
+                               frames::kCardMostAxes * frames::kCardAxisParts + 1;  // card_hold
 constexpr uint8_t kHeldAxes = 2;  // aileron by bank, elevator by pitch: as the servos begin
 constexpr uint16_t kCardFieldsBytes = offsetof(CardHead, crc);
 

@@ -22,7 +22,7 @@ constexpr uint8_t kBoth = 3;
 frames::CardHoldLayout gains() {
   frames::CardHoldLayout card = {};
   for (uint8_t axis = 0; axis < core::kHeldAxes; ++axis) {
-    card.angle_gain[axis] = 3277;   // 0.2 ticks per 0.01 deg
+    card.angle_gain[axis] = 3277;    // 0.2 ticks per 0.01 deg
     card.integral_gain[axis] = 350;  // a third of it a second
     card.rate_gain[axis] = 1000;
     card.authority_us[axis] = 100;
@@ -101,9 +101,9 @@ TEST_CASE("the law is that of double precision to a tick, over the range") {
     // Small motions mostly, so that the integral moves; now and then the ends of the range.
     const int16_t reach = flight % 4 == 0 ? int16_t{4500} : int16_t{60};
     for (uint8_t sample = 0; sample < 200; ++sample) {
-      const int16_t angle =
-          flight % 4 == 0 ? between(random, static_cast<int16_t>(-reach), reach)
-                          : static_cast<int16_t>(wanted + between(random, -60, 60));
+      const int16_t angle = flight % 4 == 0
+                                ? between(random, static_cast<int16_t>(-reach), reach)
+                                : static_cast<int16_t>(wanted + between(random, -60, 60));
       const int16_t rate =
           flight % 4 == 0 ? between(random, INT16_MIN, INT16_MAX) : between(random, -50, 50);
       const double right = exact.demand(card, wanted - angle, rate);
@@ -129,8 +129,8 @@ TEST_CASE("the surface goes against the error, whichever way its servo turns") {
     card.rate_gain[0] = static_cast<int16_t>(sign * card.rate_gain[0]);
     axis.load(card, 0);
     axis.start(0);
-    CHECK(sign * axis.demand(500, 0) < 0);   // right wing down: to the left
-    CHECK(sign * axis.demand(0, 500) < 0);   // rolling right: to the left
+    CHECK(sign * axis.demand(500, 0) < 0);  // right wing down: to the left
+    CHECK(sign * axis.demand(0, 500) < 0);  // rolling right: to the left
     CHECK(sign * axis.demand(-500, 0) > 0);
   }
 }

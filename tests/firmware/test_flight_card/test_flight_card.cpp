@@ -91,9 +91,9 @@ TEST_CASE("a good head, and who wrote it"){
             HEAD_SAYS(magic, 0x4347, CardFault::kMagic) HEAD_SAYS(magic, 0x4345, CardFault::kMagic)
                 HEAD_SAYS(version, 0, CardFault::kOtherVersion)
                     HEAD_SAYS(version, 1, CardFault::kOtherVersion)
-                    HEAD_SAYS(version, 3, CardFault::kOtherVersion)
-                        HEAD_SAYS(aircraft[15], 'x', CardFault::kAircraft)
-                            HEAD_SAYS(aircraft[0], 'U', CardFault::kAircraft)}
+                        HEAD_SAYS(version, 3, CardFault::kOtherVersion)
+                            HEAD_SAYS(aircraft[15], 'x', CardFault::kAircraft)
+                                HEAD_SAYS(aircraft[0], 'U', CardFault::kAircraft)}
 
 TEST_CASE("each limit of the head at its edge and behind it") {
   const CardFault no = CardFault::kLimits;

@@ -109,7 +109,7 @@ TEST_CASE("a look at all sensors, the aircraft far from home") {
 TEST_CASE("a row is judged at its trigger") {
   core::CardRow row = costliest();
   row.crc = core::crc16(core::kCrc16Start, &row, offsetof(core::CardRow, crc));
-  core::RowLimits limits = {{500, 500, 500}, 500};
+  core::RowLimits limits = {{500, 500, 500}, 500, false};
   frames::CardFault fault = frames::CardFault::kCrc;
   CHECK(cycles_of([&] { fault = core::judge_row(row, limits); }) < 2 * kMostCycles);
   CHECK((fault == frames::CardFault::kNone));
