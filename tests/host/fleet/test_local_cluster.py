@@ -20,25 +20,30 @@ class Local:
 
     scheduler: str
     http_ports: dict[str, int]
-    listening: list[tuple[str, int]]
+    listening: set[tuple[str, int]]
+
+
+def listening() -> set[tuple[str, int]]:
+    """Return every address and port that this process and its children listen at."""
+    us = psutil.Process()
+    return {
+        (at.laddr.ip, at.laddr.port)
+        for process in (us, *us.children(recursive=True))
+        for at in process.net_connections("inet")
+        if at.status == psutil.CONN_LISTEN
+    }
 
 
 @pytest.fixture(scope="module")
 def local() -> Iterator[Local]:
+    before = listening()  # of other tests in this process
     with _local(ClusterOptions(workers=1), lambda line: None) as client:
         assert client.cluster is not None
         scheduler = client.cluster.scheduler
         ports = {"scheduler": scheduler.http_server.port} | client.run(
             lambda dask_worker: dask_worker.http_server.port
         )
-        us = psutil.Process()
-        open_ports = [
-            (at.laddr.ip, at.laddr.port)
-            for process in (us, *us.children(recursive=True))
-            for at in process.net_connections("inet")
-            if at.status == psutil.CONN_LISTEN
-        ]
-        yield Local(scheduler.address, ports, open_ports)
+        yield Local(scheduler.address, ports, listening() - before)
 
 
 def asked(port: int, path: str, headers: list[tuple[str, str]]) -> int:
