@@ -9,12 +9,6 @@ using frames::InputEnd;
 
 constexpr uint8_t kSumShift = 2;         // 20 errors of 6000 stay within 16 bits
 constexpr uint16_t kMostStepUs = 15000;  // a sample that came late moves no further than this long
-constexpr uint8_t kTicks = 2;            // per us
-
-uint16_t size_of(int16_t value) {
-  return value < 0 ? static_cast<uint16_t>(-static_cast<int32_t>(value))
-                   : static_cast<uint16_t>(value);
-}
 
 // An axis that is held turns on for 0.16 s: a servo's period of 20 ms, its own lag of 20 to 40 ms,
 // and the time of the roll mode, 0.1 s. A raw step of a rate is a quarter of 0.01 deg in 0.164 s.
@@ -29,7 +23,7 @@ void HeldAxis::load(const frames::CardHoldLayout& card, uint8_t axis) {
   angle_gain_ = card.angle_gain[axis];
   integral_gain_ = card.integral_gain[axis];
   rate_gain_ = card.rate_gain[axis];
-  authority_ = static_cast<int16_t>(card.authority_us[axis] * kTicks);
+  authority_ = static_cast<int16_t>(card.authority_us[axis] * kTicksPerUs);
 }
 
 void HeldAxis::start(int16_t angle) {
@@ -90,7 +84,7 @@ void AttitudeHold::arm(const RcChannels& rc) {
 
 bool AttitudeHold::sticks_still(const RcChannels& rc, uint16_t stick_us) const {
   for (uint8_t i = 0; i < kServos; ++i) {
-    if (apart(rc.width_ticks[i], stick_ticks_[i]) > stick_us * kTicks) return false;
+    if (apart(rc.width_ticks[i], stick_ticks_[i]) > stick_us * kTicksPerUs) return false;
   }
   return true;
 }

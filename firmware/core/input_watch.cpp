@@ -18,11 +18,6 @@ bool inside(uint16_t value, uint16_t least, uint16_t most) {
   return value >= least && value <= most;
 }
 
-uint16_t size_of(int16_t value) {
-  return value < 0 ? static_cast<uint16_t>(-static_cast<int32_t>(value))
-                   : static_cast<uint16_t>(value);
-}
-
 // Value of a watched analogue input; its slot is its bit of ident.valid.
 uint16_t analog(const uint16_t* pair, uint8_t input) {
   return pair[input & 1U];

@@ -9,6 +9,12 @@
 
 namespace core {
 
+// Without the sign; of -32768 too.
+inline uint16_t size_of(int16_t value) {
+  return value < 0 ? static_cast<uint16_t>(-static_cast<int32_t>(value))
+                   : static_cast<uint16_t>(value);
+}
+
 // As Sensors has them; raw as in the frames `ident`, `baro`, `gps`.
 struct InputReadings {
   int16_t rates[3];
