@@ -154,52 +154,70 @@ def test_no_slice_of_a_row_that_holds_lasts_0p3_ms(holding: InputRig, flight_elf
     assert max(lengths) < LONGEST_CYCLES
 
 
-def _held_stick(flight: InputFlight) -> float:
-    first = frame(flight, HELD_FAULT_S)
+def _stick(flight: InputFlight, at_s: float) -> float:
+    first = frame(flight, at_s)
     flight.width_us[first:, ELEVATOR] += 100
     return first * flight.frame_s + 0.001 + 0.0023 * ELEVATOR + 0.0025
 
 
-def _held_switch(flight: InputFlight) -> float:
-    first = frame(flight, HELD_FAULT_S)
-    flight.width_us[first:, SWITCH] = DIRECT_US
+def _switch(flight: InputFlight, at_s: float) -> float:
+    first = frame(flight, at_s)
+    flight.width_us[first:, SWITCH] = MEGA_US
     return first * flight.frame_s + 0.001 + 0.0023 * SWITCH + 0.0025
 
 
-def _held_silence(flight: InputFlight) -> float:
-    first = frame(flight, HELD_FAULT_S)
+def _silence(flight: InputFlight, at_s: float) -> float:
+    first = frame(flight, at_s)
     flight.width_us[first:] = 0
     return (first - 1) * flight.frame_s + 0.001 + 1.5 * flight.frame_s
 
 
-def _held_imu_silent(flight: InputFlight) -> float:
-    flight.imu_sent[int(HELD_FAULT_S / PACKET_S) :] = False
-    return HELD_FAULT_S + 0.030
+def _channel(flight: InputFlight, at_s: float) -> float:
+    first = frame(flight, at_s)
+    flight.width_us[first:, AILERON] = 0
+    return (first - 1) * flight.frame_s + 0.001 + 1.5 * flight.frame_s
 
 
-def _held_bank(flight: InputFlight) -> float:
-    packet = int(HELD_FAULT_S / PACKET_S)
+def _imu_silent(flight: InputFlight, at_s: float) -> float:
+    flight.imu_sent[int(at_s / PACKET_S) :] = False
+    return at_s + 0.030
+
+
+def _imu_bank(flight: InputFlight, at_s: float) -> float:
+    packet = int(at_s / PACKET_S)
+    flight.imu[packet:, 6] = 6200
+    return packet * PACKET_S + 0.005
+
+
+def _direct(flight: InputFlight, at_s: float) -> float:
+    first = frame(flight, at_s)
+    flight.width_us[first:, SWITCH] = DIRECT_US
+    return first * flight.frame_s + 0.001 + 0.0023 * SWITCH + 0.0025
+
+
+def _held_bank(flight: InputFlight, at_s: float) -> float:
+    packet = int(at_s / PACKET_S)
     flight.imu[packet:, 6] = 4510
     return packet * PACKET_S + 0.005
 
 
-def _held_roll(flight: InputFlight) -> float:
+def _held_roll(flight: InputFlight, at_s: float) -> float:
     """45 deg of bank within 0.16 s."""
-    packet = int(HELD_FAULT_S / PACKET_S)
+    packet = int(at_s / PACKET_S)
     flight.imu[packet:, 6], flight.imu[packet:, 0] = 3000, 6100
     return packet * PACKET_S + 0.005
 
 
 @pytest.mark.parametrize(
     "fault",
-    [_held_stick, _held_switch, _held_silence, _held_imu_silent, _held_bank, _held_roll],
+    [_stick, _direct, _silence, _imu_silent, _held_bank, _held_roll],
 )
 def test_held_surfaces_are_plain_behind_a_fault(
-    holding: InputRig, fault: Callable[[InputFlight], float]
+    holding: InputRig, fault: Callable[[InputFlight, float], float]
 ) -> None:
     def fly() -> tuple[int, int]:
         flight = deepcopy(holding.flight)
-        known_s = fault(flight)
+        known_s = fault(flight, HELD_FAULT_S)
         holding.change(flight)
         holding.run_to(HELD_FAULT_S + 0.4)
         pulses = holding.pulses()
@@ -222,56 +240,15 @@ def test_a_reset_forgets_what_was_proven_and_held(holding: InputRig) -> None:
     assert in_fork(fly) == 0
 
 
-def _stick(flight: InputFlight) -> float:
-    first = frame(flight, FAULT_S)
-    flight.width_us[first:, ELEVATOR] += 100
-    return first * flight.frame_s + 0.001 + 0.0023 * ELEVATOR + 0.0025
-
-
-def _switch(flight: InputFlight) -> float:
-    first = frame(flight, FAULT_S)
-    flight.width_us[first:, SWITCH] = MEGA_US
-    return first * flight.frame_s + 0.001 + 0.0023 * SWITCH + 0.0025
-
-
-def _silence(flight: InputFlight) -> float:
-    first = frame(flight, FAULT_S)
-    flight.width_us[first:] = 0
-    return (first - 1) * flight.frame_s + 0.001 + 1.5 * flight.frame_s
-
-
-def _channel(flight: InputFlight) -> float:
-    first = frame(flight, FAULT_S)
-    flight.width_us[first:, AILERON] = 0
-    return (first - 1) * flight.frame_s + 0.001 + 1.5 * flight.frame_s
-
-
-def _imu_silent(flight: InputFlight) -> float:
-    flight.imu_sent[int(FAULT_S / PACKET_S) :] = False
-    return FAULT_S + 0.030
-
-
-def _imu_bank(flight: InputFlight) -> float:
-    packet = int(FAULT_S / PACKET_S)
-    flight.imu[packet:, 6] = 6200
-    return packet * PACKET_S + 0.005
-
-
-def _direct(flight: InputFlight) -> float:
-    first = frame(flight, FAULT_S)
-    flight.width_us[first:, SWITCH] = DIRECT_US
-    return first * flight.frame_s + 0.001 + 0.0023 * SWITCH + 0.0025
-
-
 @pytest.mark.parametrize(
     "fault", [_stick, _switch, _direct, _silence, _channel, _imu_silent, _imu_bank]
 )
 def test_plain_pulses_behind_a_fault_of_the_pilots_link_or_the_imu(
-    running: InputRig, fault: Callable[[InputFlight], float]
+    running: InputRig, fault: Callable[[InputFlight, float], float]
 ) -> None:
     def fly() -> list[str]:
         flight = deepcopy(running.flight)
-        known_s = fault(flight)
+        known_s = fault(flight, FAULT_S)
         running.change(flight)
         running.run_to(FAULT_S + 0.4)
         return wrong(running, known_s)
