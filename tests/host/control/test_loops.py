@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+import re
 
 import control
 import numpy as np
 import pytest
 from host.arrays import Array
-from host.control import ControlError
+from host.control import ControlError, release_in, release_note
 from host.control.autopilots import ardupilot, inav, mega, px4
 from host.control.autopilots.known import AUTOPILOTS
 from host.control.autopilots.structure import state_space
 from host.control.margins import FAR_DB, margins
 from host.control.plant import continuous, sampled
+from host.control.releases import called
 from host.control.scenarios import law_response
 
 
@@ -213,6 +215,45 @@ def test_names_of_older_releases_are_read_too() -> None:
     assert "AIRSPEED_MAX" in found.assumed
     both = ardupilot.structure("roll", {**old, "AIRSPEED_MIN": 13.0}, 15.0)
     assert both.fixed["airspeed_min_mps"] == 13.0
+
+
+@pytest.mark.parametrize(
+    ("firmware", "release"),
+    [
+        ("ArduPlane V4.5.7 (0a1b2c3d)", "4.5"),
+        ("PX4 release/1.14 PX4_FMU_V6X", "1.14"),
+        ("PX4 v1.15 SIMULATED", "1.15"),
+        ("PX4 main PX4_FMU_V5", ""),
+    ],
+)
+def test_a_log_names_its_release(firmware: str, release: str) -> None:
+    assert release_in(firmware) == release
+
+
+def test_parameters_have_the_names_of_their_release() -> None:
+    assert called("ardupilot", "AIRSPEED_MIN", "4.4.2") == "ARSPD_FBW_MIN"
+    assert called("ardupilot", "AIRSPEED_MIN", "4.5") == "AIRSPEED_MIN"
+    assert called("ardupilot", "AIRSPEED_MIN", "") == "AIRSPEED_MIN"
+    assert called("inav", "pid_iterm_limit_percent", "7") == "fw_iterm_throw_limit"
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "release", "said"),
+    [
+        ("ardupilot", "4.0", "ardupilot 4.0: before 4.1 another law flies"),
+        ("px4", "1.9", "px4 1.9: before 1.14"),
+        ("inav", "newest", "release 'newest', expected a number such as 4.5"),
+        ("mega", "1.0", "mega has none"),
+    ],
+)
+def test_a_release_that_was_not_read_is_refused(autopilot: str, release: str, said: str) -> None:
+    with pytest.raises(ControlError, match=re.escape(said)):
+        release_note(autopilot, release)
+
+
+def test_a_newer_release_is_tuned_and_told() -> None:
+    assert release_note("px4", "1.16.1") == ""
+    assert "newer than 1.16" in release_note("px4", "1.17")
 
 
 def test_a_law_that_is_another_is_refused() -> None:

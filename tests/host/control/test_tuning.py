@@ -27,6 +27,7 @@ from host.control.outer_loops import OuterCheck
 from host.control.parameter_file import Change, taken_back
 from host.control.scenarios import Problem, draw, scenarios_of
 from host.control.tuning import Tuning
+from host.control.tuning_notes import tuning_notes
 from host.control.uncertain_axis import UncertainAxis
 from host.control.verification import Required, control_margins, verify
 from host.control.worst_aircraft import worst_on_contour
@@ -222,6 +223,14 @@ def test_files_of_ground_stations_have_their_own_lines() -> None:
         "set fw_p_roll = 9",
         "save",
     ]
+
+
+def test_defaults_are_told_by_the_names_of_the_release() -> None:
+    found = [AxisTuning(problem(0.1), design(problem(0.1), seed=1), {})]
+    chosen = AUTOPILOTS["ardupilot"]
+    older, newer = (" ".join(tuning_notes(found, chosen, {}, (), r)) for r in ("4.4", "4.5"))
+    assert "ARSPD_FBW_MIN, ARSPD_FBW_MAX" in older
+    assert "AIRSPEED_MIN, AIRSPEED_MAX" in newer
 
 
 def test_a_file_without_parameters_is_refused(tmp_path: Path) -> None:

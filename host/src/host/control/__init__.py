@@ -7,9 +7,18 @@ if TYPE_CHECKING:
     from host.control.autopilots.known import AUTOPILOTS
     from host.control.control_error import ControlError
     from host.control.parameter_file import read_parameters
+    from host.control.releases import release_in, release_note
     from host.control.tuning import Tuning, tune
 
-__all__ = ["AUTOPILOTS", "ControlError", "Tuning", "read_parameters", "tune"]
+__all__ = [
+    "AUTOPILOTS",
+    "ControlError",
+    "Tuning",
+    "read_parameters",
+    "release_in",
+    "release_note",
+    "tune",
+]
 
 __getattr__ = lazily(
     __name__,
@@ -18,6 +27,8 @@ __getattr__ = lazily(
         "ControlError": "control_error",
         "Tuning": "tuning",
         "read_parameters": "parameter_file",
+        "release_in": "releases",
+        "release_note": "releases",
         "tune": "tuning",
     },
 )

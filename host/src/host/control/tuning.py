@@ -24,6 +24,7 @@ from host.control.loop_design import STEP_SHARE, design
 from host.control.outer_loops import OuterCheck, check
 from host.control.parameter_file import Change, taken_back
 from host.control.plant import RATES
+from host.control.releases import release_note
 from host.control.scenarios import Problem
 from host.control.tuning_notes import tuning_notes
 from host.control.uncertain_axis import UncertainAxis, axes_of, axes_of_models
@@ -53,6 +54,8 @@ class Tuning:
         Day of the covariance that the gains hold over.
     notes : tuple of str
         What was not known, and what was taken in its place.
+    release : str
+        Of the autopilot, as its log or the caller names it; empty where nobody does.
     """
 
     autopilot: Autopilot
@@ -62,6 +65,12 @@ class Tuning:
     dated: str = ""
     yaw: YawTuning | None = None
     outer: tuple[OuterCheck, ...] = ()
+    release: str = ""
+
+    @property
+    def named(self) -> str:
+        """Autopilot and its release."""
+        return f"{self.autopilot.name} {self.release}".rstrip()
 
     @property
     def tuned(self) -> tuple[AxisTuning | YawTuning, ...]:
@@ -93,6 +102,7 @@ class Tuning:
     def to_param(self) -> str:
         """Return the changed parameters as the file that the ground station loads."""
         heading = {"aircraft": self.aircraft, "covariance_date": self.dated}
+        heading |= {"for": self.named} if self.release else {}
         return self.autopilot.text(self.changes, {**heading, **dict(self._proven())})
 
     def _proven(self) -> Iterator[tuple[str, str | float]]:
@@ -128,6 +138,7 @@ class Tuning:
         """Return everything as plain numbers and strings."""
         return {
             "autopilot": self.autopilot.name,
+            "release": self.release,
             "aircraft": self.aircraft,
             "covariance_date": self.dated,
             "gains": self.gains,
@@ -189,6 +200,7 @@ def tune(
     autopilot: str = "ardupilot",
     parameters: Mapping[str, float] | None = None,
     airspeeds_mps: Sequence[float] = (),
+    release: str = "",
     seed: int = 0,
 ) -> Tuning:
     """Return the fastest gains that keep 6 dB and 45 degrees over all that the data leave open.
@@ -205,19 +217,23 @@ def tune(
         Of the autopilot, as a log or a parameter file has them; its defaults without.
     airspeeds_mps : sequence of float
         Speeds that the gains hold at; least, trim and largest of the aircraft file without.
+    release : str
+        Of the autopilot, such as ``4.5``; today's names of parameters without.
     seed : int
         Of the aircraft drawn.
 
     Raises
     ------
     ControlError
-        Nothing can be tuned: no model of an axis, no travel, an unknown autopilot.
+        Nothing can be tuned: no model of an axis, no travel, an unknown autopilot, or a release
+        whose law was not read.
     host.errors.HostError
         A file cannot be read.
     """
     if autopilot not in AUTOPILOTS:
         raise ControlError(f"autopilot '{autopilot}', expected {', '.join(AUTOPILOTS)}")
     chosen = AUTOPILOTS[autopilot]
+    newer = release_note(autopilot, release) if release else ""
     if isinstance(source, Sequence):
         paths = [Path(one) for one in source]
         axes, noise = axes_of_models(paths), dict[str, float]()
@@ -247,7 +263,8 @@ def tune(
         before = logged if chosen.words else usual
         found.append(AxisTuning(problem, design(problem, seed=seed), before))
     flown = () if isinstance(source, Sequence) else _airspeeds_mps(source)
-    notes = list(tuning_notes(found, chosen, logged, flown))
+    told = tuning_notes(found, chosen, logged, flown, release)
+    notes = [*([newer] if newer else []), *told]
     yaw = None
     try:
         found, yaw = with_rudder(chosen, aircraft, found, seed)
@@ -255,7 +272,9 @@ def tune(
         notes.append(f"no yaw damper: {error}")
     found = [_explained(one) for one in found]
     outer = tuple(_around(chosen, found, logged, seed))
-    return Tuning(chosen, loaded.name, tuple(found), tuple(notes), dated.isoformat(), yaw, outer)
+    return Tuning(
+        chosen, loaded.name, tuple(found), tuple(notes), dated.isoformat(), yaw, outer, release
+    )
 
 
 def _explained(one: AxisTuning) -> AxisTuning:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from host.constants import NORMAL_95
 from host.control.autopilots.known import Autopilot
 from host.control.axis_tuning import AxisTuning
+from host.control.releases import called
 
 
 def tuning_notes(
@@ -14,6 +15,7 @@ def tuning_notes(
     chosen: Autopilot,
     logged: Mapping[str, float],
     flown_mps: Sequence[float],
+    release: str = "",
 ) -> Iterator[str]:
     """Yield what was not known and what was taken in its place, a sentence each.
 
@@ -25,6 +27,8 @@ def tuning_notes(
         Parameters by name.
     flown_mps : sequence of float
         Least and largest airspeed of the maneuvers; empty where nobody knows.
+    release : str
+        Whose names of parameters are told; today's where it is empty.
     """
     for missing in {"roll", "pitch"} - {one.axis for one in axes}:
         yield f"no gains for {missing}: the answer has no model of it"
@@ -39,7 +43,8 @@ def tuning_notes(
             " log that has them"
         )
     if told:
-        yield f"defaults stand for {', '.join(told)}"
+        names = (called(chosen.name, name, release) for name in told)
+        yield f"defaults stand for {', '.join(names)}"
     if logged.get("tpa_rate", 0.0) > 0.0 and chosen.name == "inav":
         yield "tpa_rate makes gains follow the throttle, which no aircraft here does: set it to 0"
     for one in own:

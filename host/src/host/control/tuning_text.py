@@ -28,7 +28,7 @@ FIRST_FLIGHT = (
 
 def tuning_lines(found: Tuning) -> Iterator[str]:
     """Return the answer line by line."""
-    yield f"{found.aircraft}, gains for {found.autopilot.name}"
+    yield f"{found.aircraft}, gains for {found.named}"
     yield from (f"  note: {one}" for one in found.notes)
     for axis in found.axes:
         yield ""

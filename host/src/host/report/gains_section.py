@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from host.control import AUTOPILOTS, tune
+from host.control import AUTOPILOTS, release_in, tune
 from host.errors import HostError, UsageError
 from host.readers.autopilot_flight import is_autopilot_log, read_autopilot
 from host.report.embedded_picture import picture
@@ -32,12 +32,14 @@ def check_gains(autopilot: str, aircraft: str | None) -> None:
 def gains_section(found: Identification, autopilot: str, aircraft: str, first_source: Path) -> str:
     """Return text and pictures, or the line that says why there are no gains."""
     try:
-        own = read_autopilot(first_source) if is_autopilot_log(first_source) else None
+        log = read_autopilot(first_source).log if is_autopilot_log(first_source) else None
+        own = log if log and log.autopilot == autopilot else None
         tuned = tune(
             found,
             aircraft=aircraft,
             autopilot=autopilot,
-            parameters=dict(own.log.parameters) if own else None,
+            parameters=dict(own.parameters) if own else None,
+            release=release_in(own.firmware) if own else "",
         )
         drawn = "".join(
             picture(figure, f"{axis}: steps, margins, poles and loop of aircraft drawn")

@@ -7,7 +7,10 @@ import json
 import os
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from host.control import Tuning
 
 
 def add_parser(subparsers: Any) -> None:
@@ -28,6 +31,9 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--parameters", type=Path, metavar="FILE",
                         help="the autopilot's parameters as the ground station saves them; a log"
                         " of it has its own")  # fmt: skip
+    parser.add_argument("--release", default="", metavar="N",
+                        help="the autopilot's release, such as 4.5; a log of it names its"
+                        " own")  # fmt: skip
     parser.add_argument("--airspeed", type=float, action="append", default=[], metavar="MPS",
                         help="airspeed that the gains hold at; repeatable (default: least, trim"
                         " and largest of the aircraft file)")  # fmt: skip
@@ -43,9 +49,16 @@ def run(args: argparse.Namespace) -> int:
     """Tune and print."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.aircraft.origin import announce_aircraft
-    from host.control import AUTOPILOTS, ControlError, read_parameters, tune
+    from host.control import (
+        AUTOPILOTS,
+        ControlError,
+        read_parameters,
+        release_in,
+        release_note,
+        tune,
+    )
     from host.errors import ExitCode
-    from host.export.atomic_files import atomic_write, check_destination
+    from host.export.atomic_files import check_destination
     from host.planning.identified_aircraft import is_model
     from host.readers.autopilot_flight import is_autopilot_log, read_autopilot
     from host.sysid.pipeline import identify
@@ -62,28 +75,38 @@ def run(args: argparse.Namespace) -> int:
     models = [one for one in args.source if is_model(one)]
     if models and len(models) < len(args.source):
         raise ControlError("SOURCE names models and logs, expected one kind")
-    source: Any = models
-    if not models:
-        first = Path(args.source[0])
-        if not logged and is_autopilot_log(first):
-            log = read_autopilot(first).log
-            if log.autopilot == args.autopilot:
-                logged = dict(log.parameters)
-            else:
-                print(
-                    f"host: {first} is a log of {log.autopilot}, gains are for {args.autopilot}:"
-                    " its parameters are left out; name the others with --parameters",
-                    file=sys.stderr,
-                )
-        source = identify(args.source, aircraft=args.aircraft)
+    first, release = Path(args.source[0]), args.release
+    if not models and not (logged and release) and is_autopilot_log(first):
+        log = read_autopilot(first).log
+        if log.autopilot == args.autopilot:
+            logged = logged or dict(log.parameters)
+            release = release or release_in(log.firmware)
+        elif not logged:
+            print(
+                f"host: {first} is a log of {log.autopilot}, gains are for {args.autopilot}:"
+                " its parameters are left out; name the others with --parameters",
+                file=sys.stderr,
+            )
+    if release:
+        release_note(args.autopilot, release)
+    source: Any = models or identify(args.source, aircraft=args.aircraft)
     found = tune(
         source,
         aircraft=args.aircraft,
         autopilot=args.autopilot,
         parameters=logged,
         airspeeds_mps=args.airspeed,
+        release=release,
     )
     print(json.dumps(found.document(), indent=2) if args.json else found.to_text())
+    _write(args, found)
+    return int(ExitCode.OK)
+
+
+def _write(args: argparse.Namespace, found: Tuning) -> None:
+    """Write parameters, the way back and pictures where they are asked for."""
+    from host.export.atomic_files import atomic_write
+
     if args.save is not None:
         before = args.save.with_name(f"{args.save.stem}-before{args.save.suffix}")
         texts = {args.save: found.to_param()}
@@ -98,4 +121,3 @@ def run(args: argparse.Namespace) -> int:
             with atomic_write(args.plots / f"tune_{axis}.svg") as unfinished:
                 figure.savefig(unfinished)
         print(f"wrote {args.plots}", file=sys.stderr)
-    return int(ExitCode.OK)

@@ -121,9 +121,8 @@ LOGGED = {
     "gyro_filter_hz": "INS_GYRO_FILTER",
     "loop_hz": "SCHED_LOOP_RATE",
     "scaling_speed_mps": "SCALING_SPEED",
-    # Before 4.5 behind the bar (ArduPlane/ReleaseNotes.txt).
-    "airspeed_min_mps": "AIRSPEED_MIN|ARSPD_FBW_MIN",
-    "airspeed_max_mps": "AIRSPEED_MAX|ARSPD_FBW_MAX",
+    "airspeed_min_mps": "AIRSPEED_MIN",
+    "airspeed_max_mps": "AIRSPEED_MAX",
 }
 PREFIX = {"roll": "RLL", "pitch": "PTCH"}
 
@@ -153,7 +152,7 @@ def structure(axis: str, logged: Mapping[str, float], trim_mps: float) -> ArduPl
         )
     names = {key: name.format(PREFIX[axis]) for key, name in LOGGED.items()}
     fixed = parameter_table.fixed("ardupilot", names, logged)
-    told = parameter_table.assumed(names, logged)
+    told = parameter_table.assumed("ardupilot", names, logged)
     return ArduPlane(axis, fixed, trim_mps, mixer_share(axis, logged), assumed=told)
 
 

@@ -24,7 +24,7 @@ P_DIVISOR, I_DIVISOR, D_DIVISOR, FF_DIVISOR, LEVEL_DIVISOR = 31.0, 4.0, 1905.0, 
 # A filter of two equal lags has its corner where its makers say it with each this much faster.
 PT2_SHARE = 1.0 / math.sqrt(math.sqrt(2.0) - 1.0)
 LOGGED = {
-    "integral_percent": "pid_iterm_limit_percent|fw_iterm_throw_limit",
+    "integral_percent": "pid_iterm_limit_percent",
     "gyro_filter_hz": "gyro_main_lpf_hz",
     "dterm_hz": "dterm_lpf_hz",
     "level_filter_hz": "fw_i_level",
@@ -141,5 +141,5 @@ def structure(axis: str, logged: Mapping[str, float], trim_mps: float) -> Inav:
         fixed["integral_percent"] /= 5.0  # of 500, up to release 7
     if logged.get("looptime", 0.0) > 0.0:
         fixed["loop_hz"] = 1e6 / logged["looptime"]
-    told = parameter_table.assumed({**LOGGED, "loop_hz": "looptime"}, logged)
+    told = parameter_table.assumed("inav", {**LOGGED, "loop_hz": "looptime"}, logged)
     return Inav(axis, fixed, trim_mps, assumed=told)

@@ -23,6 +23,23 @@ def settings(autopilot: str, axis: str) -> dict[str, Setting]:
     return {role: Setting(*listed) for role, listed in _document(autopilot)[axis].items()}
 
 
+def releases(autopilot: str) -> tuple[str, ...]:
+    """Return the oldest and the newest release that was read; none where there are none."""
+    return tuple(_document(autopilot).get("releases", ()))
+
+
+def renamed(autopilot: str) -> Mapping[str, tuple[str, str]]:
+    """Return by today's name the older one, and the first release with today's."""
+    found: Mapping[str, tuple[str, str]] = _document(autopilot).get("renamed", {})
+    return found
+
+
+def _names(autopilot: str, name: str) -> list[str]:
+    """Return the names that a log may have for a parameter, today's last."""
+    older = renamed(autopilot).get(name)
+    return [older[0], name] if older else [name]
+
+
 def fixed(
     autopilot: str, names: Mapping[str, str], logged: Mapping[str, float]
 ) -> dict[str, float]:
@@ -32,23 +49,24 @@ def fixed(
     ----------
     autopilot : str
     names : mapping of str to str
-        The autopilot's own name of each; those of older releases behind a ``|``.
+        The autopilot's own name of each.
     logged : mapping of str to float
-        Parameters by the autopilot's names.
+        Parameters by the autopilot's names, of any release that was read.
     """
     known = {
         key: float(logged[one])
         for key, name in names.items()
-        for one in reversed(name.split("|"))
+        for one in _names(autopilot, name)
         if one in logged
     }
     return {**_document(autopilot)["fixed"], **known}
 
 
-def assumed(names: Mapping[str, str], logged: Mapping[str, float]) -> tuple[str, ...]:
+def assumed(
+    autopilot: str, names: Mapping[str, str], logged: Mapping[str, float]
+) -> tuple[str, ...]:
     """Return the names of parameters that stay and that a log has not."""
-    listed = (name.split("|") for name in names.values())
-    return tuple(one[0] for one in listed if not logged.keys() & set(one))
+    return tuple(n for n in names.values() if not logged.keys() & set(_names(autopilot, n)))
 
 
 def named(autopilot: str, table: str, logged: Mapping[str, float]) -> dict[str, float]:
