@@ -1,5 +1,7 @@
 """A trainer of 4 kg as six equations of motion in body axes, written apart from the package.
 
+A flying wing of 1.6 kg, without rudder and with little of what damps a tail, flies by the same.
+
 Constant coefficients, lift and drag in wind axes, a parabolic polar, thrust that falls with the
 airspeed, servos of first order with a rate limit. Nothing of the package but gravity is
 used, so that an error shared by simulator and estimator shows.
@@ -64,18 +66,27 @@ class Trainer:
 
 
 TRAINER = Trainer()
+# Elevons: together they are the elevator, against each other the ailerons.
+FLYING_WING = Trainer(
+    mass=1.6, area=0.45, span=1.5, chord=0.30, ixx=0.075, iyy=0.030, izz=0.100, ixz=0.001,
+    CL_0=0.12, CL_alpha=4.2, CL_q=2.8, CL_de=0.70, CD_0=0.018, CD_CL2=0.070,
+    Cm_0=0.015, Cm_alpha=-0.42, Cm_q=-2.6, Cm_de=-0.48,
+    CY_beta=-0.22, CY_p=-0.04, CY_r=0.08, CY_dr=0.0,
+    Cl_beta=-0.07, Cl_p=-0.42, Cl_r=0.09, Cl_da=0.22, Cl_dr=0.0,
+    Cn_beta=0.045, Cn_p=-0.025, Cn_r=-0.045, Cn_da=-0.010, Cn_dr=0.0,
+    static_thrust=12.0, pitch_speed=32.0,
+)  # fmt: skip
 
 
-def trimmed(speed_mps: float) -> tuple[float, float, float]:
+def trimmed(speed_mps: float, a: Trainer = TRAINER) -> tuple[float, float, float]:
     """Return angle of attack, elevator and throttle of level flight."""
-    a = TRAINER
     force = 0.5 * DENSITY_KGPM3 * speed_mps**2 * a.area
 
     def left(x: NDArray[np.float64], /) -> list[float]:
         alpha, de, throttle = (float(v) for v in x)
         CL = a.CL_0 + a.CL_alpha * alpha + a.CL_de * de
         CD = a.CD_0 + a.CD_CL2 * CL**2
-        thrust = thrust_n(throttle, speed_mps)
+        thrust = thrust_n(throttle, speed_mps, a)
         weight = a.mass * GRAVITY_MPS2
         return [
             force * (CL * math.sin(alpha) - CD * math.cos(alpha))
@@ -89,9 +100,9 @@ def trimmed(speed_mps: float) -> tuple[float, float, float]:
     return float(alpha), float(de), float(throttle)
 
 
-def thrust_n(throttle: float, airspeed_mps: Speed) -> Speed:
+def thrust_n(throttle: float, airspeed_mps: Speed, a: Trainer = TRAINER) -> Speed:
     """Return thrust along x: it falls with the airspeed."""
-    return TRAINER.static_thrust * throttle * (1.0 - airspeed_mps / TRAINER.pitch_speed)
+    return a.static_thrust * throttle * (1.0 - airspeed_mps / a.pitch_speed)
 
 
 class Motion(NamedTuple):
@@ -112,6 +123,7 @@ def motion(
     *,
     turns: bool,
     spread: bool,
+    a: Trainer = TRAINER,
 ) -> Motion:
     """Return the motion at a state.
 
@@ -128,8 +140,8 @@ def motion(
         Gusts are given in body axes, and so turn with the aircraft; else in earth axes.
     spread : bool
         The air pitches, yaws and rolls (MIL-F-8785C, 3.7.5); else gusts act on a point.
+    a : Trainer
     """
-    a = TRAINER
     u, v, w, p, q, r, phi, theta, psi, way, _, tail_u, tail_v, tail_w, de, da, dr = x
     cf, sf, ct, st = math.cos(phi), math.sin(phi), math.cos(theta), math.sin(theta)
     gu, gv, gw = at(air.u, way), at(air.v, way), at(air.w, way)
@@ -152,7 +164,7 @@ def motion(
     CD = a.CD_0 + a.CD_CL2 * CL * CL
     CY = a.CY_beta * beta + a.CY_p * ps + a.CY_r * rs + a.CY_dr * dr
     ca, sa = math.cos(alpha), math.sin(alpha)
-    ax = (force * (CL * sa - CD * ca) + thrust_n(throttle, V)) / a.mass
+    ax = (force * (CL * sa - CD * ca) + thrust_n(throttle, V, a)) / a.mass
     ay = force * CY / a.mass
     az = -force * (CD * sa + CL * ca) / a.mass
     roll = (

@@ -1,15 +1,19 @@
-"""A flight of the trainer: four test inputs of the elevator, three of aileron and rudder each."""
+"""A flight of the trainer: four test inputs of the elevator, three of aileron and rudder each.
+
+The flying wing has no rudder, and six inputs of the ailerons.
+"""
 
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from host.constants import GRAVITY_MPS2
 from numpy.typing import NDArray
 
-from studies.foreign.aeroplane import DENSITY_KGPM3, TRAINER, motion, trimmed
+from studies.foreign.aeroplane import DENSITY_KGPM3, FLYING_WING, TRAINER, Trainer, motion, trimmed
 from studies.foreign.gust_field import Gusts, gusts
 
 STEP_S, SUBSTEPS = 0.01, 2
@@ -33,6 +37,10 @@ INPUTS = (
     *((1, 43.0 + 9.0 * k, 0.40, 4.0, SHORT) for k in range(3)),
     *((2, 70.0 + 10.0 * k, 0.80, 6.0, SHORT) for k in range(3)),
 )  # fmt: skip
+WING_INPUTS = (
+    *INPUTS[:7], *((1, 70.0 + 10.0 * k, 0.60, 4.0, SHORT) for k in range(3)),
+)  # fmt: skip
+INPUTS_OF = {TRAINER: INPUTS, FLYING_WING: WING_INPUTS}
 DURATION_S = 100.0
 HANDS_OFF_S = (1.0, 6.5)  # before and after the beginning of an input; the pilot levels else
 
@@ -48,12 +56,12 @@ class Air:
 
 
 def fly(
-    air: Air, seed: int
+    air: Air, seed: int, a: Trainer = TRAINER
 ) -> tuple[dict[str, NDArray[np.float64]], dict[str, NDArray[np.float64]]]:
     """Return the columns as measured and as they were, each (samples,)."""
     rng = np.random.default_rng(seed)
-    field = gusts(rng, air.intensity_mps, air.form, TRAINER.span if air.spread else None)
-    true = _flown(air, field) if air.intensity_mps else dict(_calm(air))
+    field = gusts(rng, air.intensity_mps, air.form, a.span if air.spread else None)
+    true = _flown(air, field, a) if air.intensity_mps else dict(_calm(air, a))
     measured = {
         name: values + NOISE.get(name, 0.0) * rng.standard_normal(len(values))
         for name, values in true.items()
@@ -62,18 +70,20 @@ def fly(
 
 
 @functools.cache
-def _calm(air: Air) -> dict[str, NDArray[np.float64]]:
+def _calm(air: Air, a: Trainer) -> dict[str, NDArray[np.float64]]:
     """Return the true columns in air that does not move: the same of every seed, read-only."""
-    true = _flown(air, gusts(np.random.default_rng(0), 0.0, air.form, None))
+    true = _flown(air, gusts(np.random.default_rng(0), 0.0, air.form, None), a)
     for values in true.values():
         values.flags.writeable = False
     return true
 
 
-def _flown(air: Air, gusts_met: Gusts) -> dict[str, NDArray[np.float64]]:
+def _flown(air: Air, gusts_met: Gusts, plane: Trainer) -> dict[str, NDArray[np.float64]]:
     """Return the true columns."""
     field = gusts_met.lists()
-    alpha, de, throttle = trimmed(SPEED_MPS)
+    alpha, de, throttle = trimmed(SPEED_MPS, plane)
+    at = functools.partial(motion, turns=air.turns, spread=air.spread, a=plane)
+    inputs = INPUTS_OF[plane]
     x = [SPEED_MPS * np.cos(alpha), 0.0, SPEED_MPS * np.sin(alpha), *[0.0] * 4, alpha, 0.0, 0.0]
     x = [float(value) for value in (*x, HEIGHT_M, *[0.0] * 3, de, 0.0, 0.0)]
     step = STEP_S / SUBSTEPS
@@ -81,14 +91,14 @@ def _flown(air: Air, gusts_met: Gusts) -> dict[str, NDArray[np.float64]]:
     rows = []
     for sample in range(round(DURATION_S / STEP_S)):
         t = sample * STEP_S
-        command = _pilot(t, x, alpha, de)
+        command = _pilot(t, x, alpha, de, inputs)
 
         def rates(
             state: list[float], wanted: tuple[float, float, float] = command
         ) -> tuple[float, ...]:
-            return motion(state, wanted, throttle, field, turns=air.turns, spread=air.spread).rates
+            return at(state, wanted, throttle, field).rates
 
-        now = motion(x, command, throttle, field, turns=air.turns, spread=air.spread)
+        now = at(x, command, throttle, field)
         rows.append((t, now.airspeed, now.alpha, now.beta, *x[3:9], *now.force, *x[14:17], x[10]))
         for substep in range(SUBSTEPS):
             a = rates(x) if substep else now.rates
@@ -122,10 +132,15 @@ def derivatives(airspeed_mps: float) -> dict[str, float]:
     return found
 
 
-def _pilot(t: float, x: list[float], theta: float, de: float) -> tuple[float, float, float]:
+Input = tuple[int, float, float, float, tuple[int, ...]]
+
+
+def _pilot(
+    t: float, x: list[float], theta: float, de: float, inputs: Sequence[Input]
+) -> tuple[float, float, float]:
     command, busy = [de, 0.0, 0.0], False
     before, after = HANDS_OFF_S
-    for surface, start_s, unit_s, degrees, signs in INPUTS:
+    for surface, start_s, unit_s, degrees, signs in inputs:
         busy |= -before < t - start_s < after
         unit = int((t - start_s) // unit_s)
         if 0 <= unit < len(signs):

@@ -11,16 +11,20 @@ from host.export.toml import dumps
 from host.physical.calibration import load_calibration
 from numpy.typing import NDArray
 
-from studies.foreign.aeroplane import DENSITY_KGPM3, thrust_n, trimmed
+from studies.foreign.aeroplane import DENSITY_KGPM3, TRAINER, Trainer, thrust_n, trimmed
 from studies.foreign.flight import SPEED_MPS
 
 Columns = dict[str, NDArray[np.float64]]
-TRAINER_FILE, SENSORS_FILE = (Path(__file__).with_name(f"{n}.toml") for n in ("trainer", "sensors"))
+TRAINER_FILE, WING_FILE, SENSORS_FILE = (
+    Path(__file__).with_name(f"{n}.toml") for n in ("trainer", "flying_wing", "sensors")
+)
 GYROS, ACCELEROMETERS = ("p_radps", "q_radps", "r_radps"), ("ax_mps2", "ay_mps2", "az_mps2")
 PLACES = ("imu_m", "vane_a_m", "vane_b_m", "pitot_a_m", "pitot_b_m")
 
 
-def with_sensor_errors(measured: Columns, rng: np.random.Generator) -> Columns:
+def with_sensor_errors(
+    measured: Columns, rng: np.random.Generator, a: Trainer = TRAINER
+) -> Columns:
     """Return columns as these sensors tell them, thrust by the airspeed they tell, and density."""
     sd = {name: float(table["sigma"]) for name, table in _errors().items() if "sigma" in table}
     found = dict(measured)
@@ -48,15 +52,15 @@ def with_sensor_errors(measured: Columns, rng: np.random.Generator) -> Columns:
         slope = 1.0 + np.mean([drawn("pot_scale") for _ in range(pots)])
         zero = float(np.mean([drawn("pot_zero_rad") for _ in range(pots)]))
         found[name] = measured[name] * slope + zero
-    _, _, throttle = trimmed(SPEED_MPS)  # where it stays
-    found["thrust_n"] = thrust_n(throttle, found["airspeed_mps"])
+    _, _, throttle = trimmed(SPEED_MPS, a)  # where it stays
+    found["thrust_n"] = thrust_n(throttle, found["airspeed_mps"], a)
     found["density_kgpm3"] = np.full(len(measured["t_s"]), density)
     return found
 
 
-def drawn_file(folder: Path, rng: np.random.Generator) -> Path:
+def drawn_file(folder: Path, rng: np.random.Generator, own: Path = TRAINER_FILE) -> Path:
     """Write the aircraft's file with mass, inertia and places as its owner measured them."""
-    document: dict[str, Any] = tomllib.loads(TRAINER_FILE.read_text(encoding="utf-8"))
+    document: dict[str, Any] = tomllib.loads(own.read_text(encoding="utf-8"))
     mass, sensors = document["mass"], document["sensors"]
 
     def off(tolerance: float, size: int = 1) -> NDArray[np.float64]:
@@ -68,7 +72,7 @@ def drawn_file(folder: Path, rng: np.random.Generator) -> Path:
     mass["cg_m"] = off(mass["cg_tolerance_m"], 3)
     for name in PLACES:
         sensors[name] = off(sensors["position_tolerance_m"], 3)
-    path = folder / "trainer.toml"
+    path = folder / own.name
     path.write_text(dumps(document), encoding="utf-8")
     return path
 

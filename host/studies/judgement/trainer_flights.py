@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +18,8 @@ from host.sysid.pipeline import Identification, at_hand, identify_columns
 
 import host
 from studies import independent
-from studies.foreign.aeroplane import TRAINER, motion, trimmed
-from studies.foreign.flight import INPUTS, SPEED_MPS, Air, fly
+from studies.foreign.aeroplane import TRAINER, Trainer, motion, trimmed
+from studies.foreign.flight import INPUTS, INPUTS_OF, SPEED_MPS, Air, Input, fly
 from studies.foreign.gust_field import Gusts
 from studies.foreign.instrument import SENSORS_FILE, Columns, drawn_file, with_sensor_errors
 from studies.judgement.default_errors import with_default_errors
@@ -97,36 +97,37 @@ def _flown(seed: int) -> tuple[Columns, Columns]:
     return fly(air_of(seed), seed)
 
 
-def truth_of(true: Columns) -> Truth:
+def truth_of(true: Columns, a: Trainer = TRAINER) -> Truth:
     """Return a truth as `host simulate` writes it: every maneuver at its mean condition."""
-    coefficients = {n: float(getattr(TRAINER, n, 0.0)) for n in COEFFICIENTS}
+    coefficients = {n: float(getattr(a, n, 0.0)) for n in COEFFICIENTS}
 
     def local(speed: float, alpha: float, de: float) -> dict[str, dict[str, float]]:
-        CL = TRAINER.CL_0 + TRAINER.CL_alpha * alpha + TRAINER.CL_de * de
-        drag = {
-            f"CD_{k}": 2.0 * TRAINER.CD_CL2 * CL * coefficients[f"CL_{k}"] for k in ("alpha", "de")
-        }
+        CL = a.CL_0 + a.CL_alpha * alpha + a.CL_de * de
+        drag = {f"CD_{k}": 2.0 * a.CD_CL2 * CL * coefficients[f"CL_{k}"] for k in ("alpha", "de")}
         return {
             "derivatives": coefficients | drag,
-            "dimensional": dimensional(functools.partial(_forces, speed), speed, alpha, de),
+            "dimensional": dimensional(functools.partial(_forces, a, speed), speed, alpha, de),
         }
 
-    return truth_document(true, local)
+    return truth_document(true, local, INPUTS_OF[a])
 
 
 def truth_document(
-    true: Columns, local: Callable[[float, float, float], dict[str, dict[str, float]]]
+    true: Columns,
+    local: Callable[[float, float, float], dict[str, dict[str, float]]],
+    inputs: Sequence[Input] = INPUTS,
 ) -> Truth:
-    """Return the truth of the inputs of `studies.foreign.flight`.
+    """Return the truth of inputs as `studies.foreign.flight` has them.
 
     Parameters
     ----------
     true : dict of (n,) arrays
     local : callable
         Given mean airspeed, angle of attack and elevator, the derivatives there.
+    inputs : sequence of Input
     """
     t, found = true["t_s"], []
-    for surface, start_s, unit_s, _, signs in INPUTS:
+    for surface, start_s, unit_s, _, signs in inputs:
         end_s = start_s + unit_s * len(signs)
         inside = (t >= start_s) & (t < end_s + RESPONSE_S)
         mean = (
@@ -153,14 +154,14 @@ def dimensional(
     return found
 
 
-def _forces(trim_mps: float, point: Array) -> dict[str, float]:
+def _forces(a: Trainer, trim_mps: float, point: Array) -> dict[str, float]:
     """Return specific forces by path axes, Z and Y over the airspeed, and angular accelerations."""
     speed, alpha, beta, p, q, r, de, da, dr = (float(x) for x in point)
     ca, sa, cb, sb = math.cos(alpha), math.sin(alpha), math.cos(beta), math.sin(beta)
     x = [speed * ca * cb, speed * sb, speed * sa * cb, p, q, r, 0.0, alpha, 0.0, 0.0, 0.0]
     x += [0.0, 0.0, 0.0, de, da, dr]
-    _, _, throttle = _trim()
-    now = motion(x, (de, da, dr), throttle, STILL, turns=True, spread=False)
+    _, _, throttle = _trim(a)
+    now = motion(x, (de, da, dr), throttle, STILL, turns=True, spread=False, a=a)
     ax, ay, az = now.force
     along = ax * ca + az * sa
     return {
@@ -174,5 +175,5 @@ def _forces(trim_mps: float, point: Array) -> dict[str, float]:
 
 
 @functools.cache
-def _trim() -> tuple[float, float, float]:
-    return trimmed(SPEED_MPS)
+def _trim(a: Trainer) -> tuple[float, float, float]:
+    return trimmed(SPEED_MPS, a)
