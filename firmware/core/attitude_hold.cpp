@@ -1,5 +1,7 @@
 #include "core/attitude_hold.h"
 
+#include <string.h>
+
 #include "core/input_command.h"
 
 namespace core {
@@ -74,6 +76,7 @@ void AttitudeHold::load(const frames::CardHoldLayout& card, uint8_t held, uint16
   for (uint8_t axis = 0; axis < kHeldAxes; ++axis) axes_[axis].load(card, axis);
   rate_max_usps_ = rate_max_usps;
   held_ = held;
+  alike_ = 0;
   // No stick is there: without arm() none was still.
   for (uint16_t& ticks : stick_ticks_) ticks = 0;
 }
@@ -89,9 +92,22 @@ bool AttitudeHold::sticks_still(const RcChannels& rc, uint16_t stick_us) const {
   return true;
 }
 
+bool AttitudeHold::still(const InputReadings& in) {
+  if (memcmp(rates_, in.rates, sizeof rates_) != 0 ||
+      memcmp(force_, in.force, sizeof force_) != 0) {
+    memcpy(rates_, in.rates, sizeof rates_);
+    memcpy(force_, in.force, sizeof force_);
+    alike_ = 1;
+    return false;
+  }
+  if (alike_ < kMostAlike) ++alike_;
+  return alike_ >= kMostAlike;
+}
+
 InputEnd AttitudeHold::may_start(const InputReadings& in) {
   theta_ = in.theta;
   if (!in.imu) return InputEnd::kSensorLost;
+  if (still(in)) return InputEnd::kSensorStill;
   const bool calm = size_of(in.phi) <= kStartBank && size_of(in.theta) <= kStartPitch &&
                     size_of(in.rates[0]) <= kStartRate && size_of(in.rates[1]) <= kStartRate &&
                     size_of(in.rates[2]) <= kStartRate;
@@ -106,6 +122,7 @@ void AttitudeHold::start(uint32_t now_us) {
 
 InputEnd AttitudeHold::step(const InputReadings& in, int16_t* applied_ticks, uint32_t now_us) {
   if (!in.imu) return InputEnd::kSensorLost;
+  if (still(in)) return InputEnd::kSensorStill;
   if (size_of(in.phi) > kMostBank) return InputEnd::kBank;
   if (size_of(in.theta) > kMostPitch) return InputEnd::kPitch;
   if (holds(kAileron) && soon_beyond(in.phi, in.rates[0], kMostBank)) return InputEnd::kBank;

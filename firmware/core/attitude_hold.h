@@ -57,6 +57,9 @@ class AttitudeHold {
   static constexpr int16_t kStartRate = 1965;  // 30 deg/s
   static constexpr int16_t kMostBank = 4500;
   static constexpr int16_t kMostPitch = 2500;
+  // Samples alike in all rates and forces, to the bit: of a sensor with noise of 4 steps in a rate
+  // and 20 in a force two are alike once in 10^9, and a sample that the IMU sent twice is no end.
+  static constexpr uint8_t kMostAlike = 4;
 
   // When a row is judged that holds.
   void load(const frames::CardHoldLayout& card, uint8_t held, uint16_t rate_max_usps);
@@ -72,12 +75,19 @@ class AttitudeHold {
 
  private:
   bool holds(uint8_t axis) const { return (held_ >> axis & 1U) != 0; }
+  // With each sample. Of its attitude nothing is asked: the filter of a frozen gyro goes on
+  // turning.
+  bool still(const InputReadings& in);
 
   HeldAxis axes_[kHeldAxes];
   uint16_t stick_ticks_[kServos];  // when it was armed
   int16_t theta_;                  // of the last sample before the trigger
   uint16_t rate_max_usps_;
   uint16_t stepped_us_;  // low half
+  // Of the sample before.
+  int16_t rates_[3];
+  int16_t force_[3];
+  uint8_t alike_;  // samples, the last one among them
   uint8_t held_;
 };
 

@@ -51,7 +51,7 @@ MOST_GUSTS_MPS = 2.0
 PILOT_S = 0.5
 MOST_BANK_DEG = 60.0
 LOST_BANK_DEG, LOST_PITCH_DEG = 90.0, 60.0
-BANK_END, PITCH_END = 4500, 2500  # core/attitude_hold.h
+BANK_END, PITCH_END, MOST_ALIKE = 4500, 2500, 4  # core/attitude_hold.h
 AILERON, ELEVATOR, RUDDER = 1, 2, 4
 # Shape, axes moved, axes held, ms, us.
 ROWS = (
@@ -64,12 +64,16 @@ ROWS = (
 
 @dataclass(slots=True)
 class Fault:
-    """What is wrong, from when on, and from when it can be known; None: it cannot."""
+    """What is wrong, and from when it can be known; None: it cannot.
+
+    A row that a reset ends has no end in the log: it ended at `reset_s`.
+    """
 
     name: str
     known_s: float | None = None
     within_s: float = PLAIN_S
     acts: list[tuple[float, Callable[[Bench], None]]] = field(default_factory=list)
+    reset_s: float | None = None
 
 
 Draw = Callable[[InputFlight, World, float, int, np.random.Generator], Fault]
@@ -122,7 +126,8 @@ def frozen(
         return kept[0]
 
     world.imu = imu
-    return Fault("IMU frozen", at_s + PACKET_S + 0.004 + 0.5 + 0.016)
+    # Alike from the first packet behind it on; its START is 4 ms behind, its bytes take 1 ms.
+    return Fault("IMU frozen", at_s + MOST_ALIKE * PACKET_S + 0.005)
 
 
 def silent(
@@ -187,7 +192,7 @@ def brown_out(
     source = int(random.choice(RESETS))
     # A turn of the loop, 1 ms at most, later than asked.
     return Fault(
-        "brown-out", at_s + 0.006, PLAIN_S, [(at_s, lambda bench: bench.sitl.reset(source))]
+        "brown-out", at_s + 0.006, PLAIN_S, [(at_s, lambda bench: bench.sitl.reset(source))], at_s
     )
 
 
@@ -266,6 +271,8 @@ def fly(number: int, seed: int, draw: Draw) -> Flown:
     end_s = TRIGGER_S + QUIET_S + row[3] / 1000 + TRIGGER_SLACK_S
     if begun_s is not None and ended_s is not None:
         end_s = ended_s
+    elif fault.reset_s is not None:
+        end_s = min(end_s, fault.reset_s)
     bank, behind, lost = _motion(motion, end_s)
     wrong = []
     known = [TRIGGER_S + QUIET_S + row[3] / 1000 + TRIGGER_SLACK_S]

@@ -71,8 +71,10 @@ struct Bench {
   }
   InputEnd step(uint16_t rest_us = 5000) {
     now_us += rest_us;
-    return hold.step(in, applied, now_us);
+    in.force[1] = static_cast<int16_t>(in.force[1] ^ 1);  // a sensor has noise
+    return again();
   }
+  InputEnd again() { return hold.step(in, applied, now_us); }
 };
 
 }  // namespace
@@ -214,6 +216,43 @@ TEST_CASE("it ends where a held axis will be beyond within 0.16 s") {
   CHECK((says(2, 0, 0, 1500, 4000) == InputEnd::kDone));
   CHECK((says(2, 0, 0, 1500, 4004) == InputEnd::kPitch));
   CHECK((says(1, 0, 0, 1500, 4004) == InputEnd::kDone));
+}
+
+TEST_CASE("a fourth sample that is alike to the bit in rates and forces ends it") {
+  Bench bench;
+  bench.start();
+  for (uint8_t value = 0; value < 6; ++value) {
+    CHECK((bench.step() == InputEnd::kDone));
+    for (uint8_t round = 0; round < 3; ++round) {
+      CHECK((bench.again() == InputEnd::kDone));
+      CHECK((bench.again() == InputEnd::kDone));
+      // One bit of one value is enough.
+      int16_t& moved = value < 3 ? bench.in.rates[value] : bench.in.force[value - 3];
+      moved = static_cast<int16_t>(moved ^ 1);
+      CHECK((bench.again() == InputEnd::kDone));
+    }
+  }
+  CHECK((bench.again() == InputEnd::kDone));
+  CHECK((bench.again() == InputEnd::kDone));
+  // What is computed from a gyro that stands goes on turning.
+  bench.in.phi = 12;
+  bench.in.theta = -7;
+  CHECK((bench.again() == InputEnd::kSensorStill));
+  CHECK((bench.again() == InputEnd::kSensorStill));
+  CHECK((bench.step() == InputEnd::kDone));
+}
+
+TEST_CASE("a row does not begin on samples that are alike") {
+  AttitudeHold hold = {};
+  hold.load(gains(), kBoth, kRateUsps);
+  InputReadings in = level();
+  in.rates[0] = 1;
+  for (uint8_t i = 1; i < AttitudeHold::kMostAlike; ++i) {
+    CHECK((hold.may_start(in) == InputEnd::kDone));
+  }
+  CHECK((hold.may_start(in) == InputEnd::kSensorStill));
+  in.rates[0] = 2;
+  CHECK((hold.may_start(in) == InputEnd::kDone));
 }
 
 TEST_CASE("wings go level, pitch stays as it was at the trigger") {
