@@ -24,6 +24,7 @@ from functools import partial
 from typing import TypeVar
 
 import numpy as np
+from host.aircraft.file import load_measured
 from host.aircraft.linear_aircraft import load
 from host.aircraft.trim import solve
 from host.arrays import Array
@@ -45,6 +46,7 @@ from studies.tuned_flights.closed_loop_flight import (
     Flown,
     fly,
 )
+from studies.tuned_flights.height_and_speed import ENERGY_LAWS, Begin, Speeds
 from studies.tuned_flights.linear_flight import fly_linear
 from studies.tuned_flights.measured_margins import computed, measured
 from studies.tuned_flights.px4_autotune import autotuned
@@ -54,7 +56,9 @@ AIRCRAFT = "ultrastick25e"
 SPEEDS_MPS = (13.0, 17.0, 20.5)  # ends and trim of the aircraft file
 STEPS = {"bank 30 deg": Demand(bank_rad=np.radians(30.0)),
          "pitch 8 deg": Demand(pitch_rad=np.radians(8.0))}  # fmt: skip
+HEIGHT_M, AIRSPEED_MPS, SLOW_S = 10.0, 2.0, 60.0
 GUSTS_MPS = (0.0, 1.0, 2.0)
+SLOW_GUSTS_MPS = (0.0, 2.0)
 SERVO_SHARE, BACK_SHARE = 0.5, 0.03  # servo at half speed, CG 3 % of the chord back
 OUTSIDE_DB, OUTSIDE_DEG = 1.5, 8.0  # of the margins computed: an outlier, which is named
 GYRO_NOISE_RADPS = 0.002
@@ -96,6 +100,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sets["default"] = {a: {r: s.default for r, s in laws[a].settings.items()} for a in AXES}
     if asked.autopilot == "px4":
         sets["autotune's"] = {one.axis: autotuned(one.problem) for one in found.axes}
+    energy = energy_law(asked.autopilot)
+    if energy is None:
+        print("No law makes throttle of height and airspeed: neither is stepped.", end="\n\n")
     drawn = from_covariance(found, asked.aircraft_drawn, asked.first)
     print(markdown(drawn), flush=True)
     with ProcessPoolExecutor(asked.processes, initializer=prefer_machine_code) as processes:
@@ -103,10 +110,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
             part = 1 if name == "tuned" else OTHER_PART
             seeds = range(asked.first, asked.first + max(asked.aircraft_drawn // part, 1))
             pair = found.yaw.problem if found.yaw and "yaw" in gains else None
-            craft = Craft(laws, gains, found.autopilot.travel_rad, pair)
+            outer = energy if name == "tuned" else None
+            craft = Craft(laws, gains, found.autopilot.travel_rad, pair, outer)
             flown = Flights(craft, seeds, processes)
             print(markdown(flown.table(f"{asked.autopilot}, {name} gains")), flush=True)
     return 0
+
+
+def energy_law(autopilot: str) -> Begin | None:
+    """Return the law of height and airspeed with the aircraft's own speeds; None where none is."""
+    known = load_measured(AIRCRAFT).scalars
+    names = ("minimum_airspeed_mps", "airspeed_mps", "maximum_airspeed_mps")
+    speeds = Speeds(*(known[f"trim.{name}"] for name in names))
+    return partial(ENERGY_LAWS[autopilot], speeds) if autopilot in ENERGY_LAWS else None
 
 
 def from_covariance(found: Tuning, count: int, seed: int) -> Table:
@@ -130,7 +146,7 @@ def _row(case: str, flown: Sequence[Flown], demand: Demand, calm: bool = True) -
     with warnings.catch_warnings():  # a step that none settles has no median
         warnings.simplefilter("ignore", RuntimeWarning)
         middle = np.nanmedian(figures, axis=0).tolist()
-    moving = sum(moving_at_the_end(one) for one in kept) if calm else math.nan
+    moving = sum(moving_at_the_end(one, demand) for one in kept) if calm else math.nan
     return (case, len(flown), len(flown) - len(kept), moving, *middle, math.nan, math.nan, "")
 
 
@@ -142,6 +158,7 @@ class Craft:
     gains: Gains
     full_rad: float | None = None
     pair: PairProblem | None = None
+    energy: Begin | None = None
 
     def loop(
         self, seed: int, speed_mps: float, servo: float = 1.0, back: float = 0.0
@@ -158,7 +175,9 @@ class Craft:
         # On the flight's own steps: between them a pulse would be flown at another time.
         pulse_s = LONGEST_STEP_S * int(rng.uniform(0.0, PULSE_PERIOD_S) / LONGEST_STEP_S)
         at = solve(frame, speed_mps)
-        return ClosedLoop(frame, at, self.laws, self.gains, pulse_s, self.full_rad, self.pair)
+        return ClosedLoop(
+            frame, at, self.laws, self.gains, pulse_s, self.full_rad, self.pair, energy=self.energy
+        )
 
     def fly(
         self,
@@ -202,16 +221,26 @@ class Flights:
 
     def _rows(self) -> Iterator[tuple[Cell, ...]]:
         for speed in SPEEDS_MPS:
-            for step in STEPS:
-                for gusts in GUSTS_MPS:
-                    yield self._row(
-                        f"{step}, {speed:g} m/s, gusts {gusts:g} m/s", step, speed, gusts
-                    )
+            steps = {**STEPS, **self._slow_steps(speed)}
+            for step, demand in steps.items():
+                for gusts in SLOW_GUSTS_MPS if demand.seconds == SLOW_S else GUSTS_MPS:
+                    case = f"{step}, {speed:g} m/s, gusts {gusts:g} m/s"
+                    yield self._row(case, demand, speed, gusts)
         for name, changes in (("servo at half speed", (SERVO_SHARE, 0.0)),
                               ("CG 3 % back", (1.0, BACK_SHARE))):  # fmt: skip
-            for step in STEPS:
-                case = f"{step}, {SPEEDS_MPS[1]:g} m/s, {name}"
-                yield self._row(case, step, SPEEDS_MPS[1], 0.0, changes)
+            speed = SPEEDS_MPS[1]
+            for step, demand in {**STEPS, **self._slow_steps(speed)}.items():
+                yield self._row(f"{step}, {speed:g} m/s, {name}", demand, speed, 0.0, changes)
+
+    def _slow_steps(self, speed: float) -> dict[str, Demand]:
+        """Return steps of height and of airspeed, towards the trim's from the fastest."""
+        if self.craft.energy is None:
+            return {}
+        faster = AIRSPEED_MPS if speed < SPEEDS_MPS[-1] else -AIRSPEED_MPS
+        return {
+            f"height {HEIGHT_M:g} m": Demand(height_m=HEIGHT_M, seconds=SLOW_S),
+            f"airspeed {faster:+g} m/s": Demand(airspeed_mps=faster, seconds=SLOW_S),
+        }
 
     def _margins(self, axis: str) -> tuple[tuple[Cell, ...], list[str]]:
         """Return a row of measured minus computed margins, and a line of each outlier."""
@@ -233,16 +262,21 @@ class Flights:
         return row, lines
 
     def _row(
-        self, case: str, step: str, speed: float, gusts: float, changes: tuple[float, ...] = ()
+        self,
+        case: str,
+        demand: Demand,
+        speed: float,
+        gusts: float,
+        changes: tuple[float, ...] = (),
     ) -> tuple[Cell, ...]:
-        demand = STEPS[step]
         some = partial(self.craft.fly, speed=speed, demand=demand, gusts=gusts, changes=changes)
-        flown = [one for part in self._shared(some) for one in part]
+        part = OTHER_PART if demand.seconds == SLOW_S else 1
+        flown = [one for some_of in self._shared(some, part) for one in some_of]
         return _row(case, flown, demand, calm=not gusts)
 
-    def _shared(self, work: Callable[[Sequence[int]], Result]) -> list[Result]:
-        """Return what parts of the aircraft gave, as many at a time as memory takes."""
-        seeds = self.seeds
+    def _shared(self, work: Callable[[Sequence[int]], Result], part: int = 1) -> list[Result]:
+        """Return what every so many of the aircraft gave, as many at a time as memory takes."""
+        seeds = self.seeds[::part]
         parts = [seeds[k : k + SIDE_BY_SIDE] for k in range(0, len(seeds), SIDE_BY_SIDE)]
         return list(self.processes.map(work, parts))
 

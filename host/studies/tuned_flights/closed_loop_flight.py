@@ -1,20 +1,22 @@
 """An aircraft in six degrees of freedom flown by an autopilot's laws at their rate.
 
 Between law and surface stand a pulse every 20 ms, the end of its travel and the servo with its
-bandwidth and rate; between motion and law the gyro's noise and filter. The throttle stays,
-and the rudder where no damper is given.
+bandwidth and rate; between motion and law the gyro's noise and filter. The throttle stays
+where no law of height and speed is given, and the rudder where no damper is.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 import numpy as np
 from host.aircraft.air import GUST_STATES, Air, Turbulence, gust_step, turbulence
 from host.aircraft.airframe import (
     AILERON,
+    DOWN,
     ELEVATOR,
     Q0,
     Q3,
@@ -29,12 +31,14 @@ from host.aircraft.attitude import euler
 from host.aircraft.rigid_body import step
 from host.aircraft.trim import Trim
 from host.arrays import Array
-from host.compiled import compiled_fast
+from host.compiled import compiled_fast, compiled_part, has_compiler
 from host.constants import GRAVITY_MPS2
 from host.control.actuator import PULSE_PERIOD_S
 from host.control.autopilots.structure import Structure
 from host.control.lateral_pair import PairProblem
 from scipy.signal import butter
+
+from studies.tuned_flights.height_and_speed import UPDATE_S, Begin, sensed
 
 AXES = ("roll", "pitch")
 LONGEST_STEP_S = 0.0025
@@ -43,16 +47,18 @@ BANK_RAD, PITCH_RAD = math.radians(90.0), math.radians(60.0)  # beyond: the flig
 # Sense of a surface's moment: aileron rolls right, elevator down pitches down, rudder left.
 SENSE = {"roll": 1.0, "pitch": -1.0, "yaw": -1.0}
 COMMANDS = {"roll": 1, "pitch": 0, "yaw": 2}
+TOGETHER = 100  # steps whose noise is drawn at once
+THROTTLE = 3  # behind the surfaces
 SURFACES = {"roll": AILERON, "pitch": ELEVATOR, "yaw": RUDDER}  # in the state
 
 
 @dataclass(frozen=True)
 class Demand:
-    """Attitude asked for: a step from trim at a time, and what is added to the laws' outputs.
+    """What is asked for: a step from trim at a time, and what is added to the laws' outputs.
 
     Attributes
     ----------
-    bank_rad, pitch_rad : float
+    bank_rad, pitch_rad, height_m, airspeed_mps : float
         Of the step.
     at_s, seconds : float
         When, and how long the flight is.
@@ -62,6 +68,8 @@ class Demand:
 
     bank_rad: float = 0.0
     pitch_rad: float = 0.0
+    height_m: float = 0.0
+    airspeed_mps: float = 0.0
     at_s: float = 1.0
     seconds: float = 8.0
     injected: Mapping[str, Array] = field(default_factory=dict)
@@ -87,6 +95,9 @@ class ClosedLoop:
         Aileron and rudder as they were tuned; the rudder's gains are under ``yaw``.
     coordinated : bool
         Whether pitch is fed the rate of a turn, as ArduPlane and PX4 do.
+    energy : callable or None
+        Begins the law that makes pitch and throttle of height and airspeed; it flies where one of
+        these is asked for.
     """
 
     frame: Airframe
@@ -97,6 +108,7 @@ class ClosedLoop:
     full_rad: float | None = None
     pair: PairProblem | None = None
     coordinated: bool = True
+    energy: Begin | None = None
 
     @property
     def moving(self) -> tuple[str, ...]:
@@ -118,6 +130,8 @@ class Flown:
     total: Mapping[str, Array]  # with what was injected
     surface_rad: Mapping[str, Array]
     lost: bool
+    height_m: Array = field(default_factory=lambda: np.zeros(0))
+    airspeed_mps: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def fly(
@@ -167,23 +181,49 @@ def fly(
     states: dict[str, Array] = {axis: np.zeros((n, law.states)) for axis, law in laws.items()}
     damped: Array = np.zeros((n, rudder.states if rudder else 0))
     rates, lagged = np.zeros((n, 3)), np.zeros((n, 3, 2))
-    gusts, air, work = np.zeros((n, GUST_STATES)), np.zeros(9), np.empty((5, x.shape[1] + 4))
+    gusts, air, work = np.zeros((n, GUST_STATES)), np.zeros((n, 9)), np.empty((5, x.shape[1] + 4))
     noises = [np.random.default_rng([seed, 48]) for seed in seeds]
-    calm = np.zeros((parts, 7))
+    noisy, noise = gusty or gyro_noise_radps > 0.0, np.zeros((n, TOGETHER, parts, 7))
+    frames = listed([one.frame for one in loops])
+    density_kgpm3 = np.array([one.trim.density_kgpm3 for one in loops])
     at_trim = euler(x[:, Q0 : Q3 + 1])
     kept = {
         name: {axis: np.zeros((n, count)) for axis in moving}
         for name in ("angle", "output", "total", "surface")
     }
+    height: Array = np.zeros((n, count))
+    airspeed: Array = np.zeros((n, count))
+    before, energy, now = x.copy(), None, sensed(x, x, air)
+    if first.energy and (demand.height_m or demand.airspeed_mps):
+        energy = first.energy(now, trims[:, THROTTLE])
+    at_height, at_speed, turn = now.height_m, now.airspeed_mps, max(round(UPDATE_S / period), 1)
     lost, outputs = np.zeros(n, dtype=bool), dict[str, Array]()
     for k in range(count):
         phi, theta, _ = euler(x[:, Q0 : Q3 + 1])
         stepped = k * period >= demand.at_s
         seen = {"roll": phi, "pitch": theta}
-        asked = {
+        asked: dict[str, Array] = {
             "roll": at_trim[0] + demand.bank_rad * stepped,
             "pitch": at_trim[1] + demand.pitch_rad * stepped,
         }
+        height[:, k] = -x[:, DOWN]
+        airspeed[:, k] = np.linalg.norm(x[:, U : W + 1] - air[:, 3:6], axis=1)
+        if energy and k % turn == 0:
+            now, before = sensed(x, before, air), x.copy()
+            demanded = (
+                at_height + demand.height_m * stepped,
+                at_speed + demand.airspeed_mps * stepped,
+            )
+            pitch, throttle = energy.step(*demanded, now)
+            wanted[:, THROTTLE] = throttle
+            laws = {
+                axis: side_by_side(
+                    [first.laws[axis].loop(first.gains[axis], v) for v in now.airspeed_mps]
+                )
+                for axis in AXES
+            }
+        if energy:
+            asked["pitch"] = pitch
         for number, axis in enumerate(AXES):
             rate = rates[:, number]
             if axis == "pitch" and first.coordinated:
@@ -209,27 +249,79 @@ def fly(
                 kept[name][axis][:, k] = value
         lost |= ~np.isfinite(x).all(axis=1)
         lost |= (np.abs(phi) > BANK_RAD) | (np.abs(theta) > PITCH_RAD)
-        for i, one in enumerate(loops):
-            if lost[i]:
-                continue
-            noise = noises[i].standard_normal((parts, 7)) if gusty or gyro_noise_radps else calm
-            advance(
-                one.frame, x[i], held[i], wanted[i], pulses[i, k], air, dryden, gusty, gusts[i],
-                noise, gyro_noise_radps, filters, lagged[i], rates[i], speed,
-                one.trim.density_kgpm3, span, work,
-            )  # fmt: skip
+        if noisy and k % TOGETHER == 0:
+            noise = np.array([one.standard_normal((TOGETHER, parts, 7)) for one in noises])
+        advance_all(
+            frames, x, held, wanted, pulses[:, k], air, dryden, gusty, gusts,
+            noise[:, k % TOGETHER], gyro_noise_radps, filters, lagged, rates, speed, density_kgpm3,
+            span, work, lost,
+        )  # fmt: skip
     t = period * np.arange(count)
 
     def of(name: str, i: int) -> dict[str, Array]:
         return {axis: rows[i] for axis, rows in kept[name].items()}
 
     return [
-        Flown(t, of("angle", i), of("output", i), of("total", i), of("surface", i), bool(lost[i]))
+        Flown(t, of("angle", i), of("output", i), of("total", i), of("surface", i), bool(lost[i]),
+              height[i], airspeed[i])
         for i in range(n)
-    ]
+    ]  # fmt: skip
+
+
+def side_by_side(loops: Sequence[Any]) -> Any:
+    """Return one loop of many that differ by their airspeeds: its numbers have shape (N,)."""
+    first = loops[0]
+    numbers = [one.name for one in fields(first) if isinstance(getattr(first, one.name), float)]
+    return replace(
+        first, **{name: np.array([getattr(one, name) for one in loops]) for name in numbers}
+    )
+
+
+def listed(frames: Sequence[Airframe]) -> Sequence[Airframe]:
+    """Return a list that machine code takes whole: to unpack a frame at each step takes longer."""
+    if not has_compiler():
+        return frames
+    from numba.typed import List
+
+    found = List()
+    for one in frames:
+        found.append(one)
+    return found  # type: ignore[no-any-return]
 
 
 @compiled_fast
+def advance_all(
+    frames: Sequence[Airframe],
+    x: State,
+    held: State,
+    wanted: State,
+    pulses: State,
+    air: State,
+    dryden: Turbulence,
+    gusty: bool,
+    gusts: State,
+    noise: State,
+    gyro_noise_radps: float,
+    filters: State,
+    lagged: State,
+    rates: State,
+    speed_mps: float,
+    density_kgpm3: State,
+    step_s: float,
+    work: State,
+    lost: State,
+) -> None:
+    """Advance every aircraft that is not lost; arrays are those of `advance`, aircraft first."""
+    for i in range(x.shape[0]):
+        if not lost[i]:
+            advance(
+                frames[i], x[i], held[i], wanted[i], pulses[i], air[i], dryden, gusty, gusts[i],
+                noise[i], gyro_noise_radps, filters, lagged[i], rates[i], speed_mps,
+                density_kgpm3[i], step_s, work,
+            )  # fmt: skip
+
+
+@compiled_part
 def advance(
     frame: Airframe,
     x: State,

@@ -9,6 +9,7 @@ from studies.tuned_flights.closed_loop_flight import Demand, Flown
 
 SETTLED_SHARE = 0.05  # of the step (Franklin, Powell & Emami-Naeini, Feedback Control, ch. 3)
 END_S = 2.0
+SLOW_END_S = 10.0  # of height and airspeed
 MOVING_SHARE = 0.1  # of the largest excursion of the surface
 
 
@@ -18,10 +19,10 @@ def step_figures(flown: Flown, demand: Demand) -> Array:
     Not a number where the step never gets there.
     """
     axis = "roll" if demand.bank_rad else "pitch"
-    size = demand.bank_rad or demand.pitch_rad
+    told, size = _stepped(flown, demand)
     behind = flown.t_s >= demand.at_s
     t = flown.t_s[behind] - demand.at_s
-    share = (flown.angle_rad[axis][behind] - flown.angle_rad[axis][0]) / size
+    share = (told[behind] - told[0]) / size
     rise = _first(t, share >= 0.9) - _first(t, share >= 0.1)
     outside = np.flatnonzero(np.abs(share - 1.0) > SETTLED_SHARE)
     settled = 0.0
@@ -32,8 +33,25 @@ def step_figures(flown: Flown, demand: Demand) -> Array:
     return np.array([rise, over, settled, float(np.sqrt(np.mean(rate**2)))])
 
 
-def moving_at_the_end(flown: Flown) -> bool:
-    """Return whether a surface still swings in calm air: a loop that is nearly unstable."""
+def _stepped(flown: Flown, demand: Demand) -> tuple[Array, float]:
+    """Return what a step was asked of, and its size."""
+    if demand.height_m:
+        return flown.height_m, demand.height_m
+    if demand.airspeed_mps:
+        return flown.airspeed_mps, demand.airspeed_mps
+    axis = "roll" if demand.bank_rad else "pitch"
+    return flown.angle_rad[axis], demand.bank_rad or demand.pitch_rad
+
+
+def moving_at_the_end(flown: Flown, demand: Demand) -> bool:
+    """Return whether something still swings in calm air: a loop that is nearly unstable.
+
+    A surface; behind a step of height or airspeed these too, by a share of the step.
+    """
+    if demand.height_m or demand.airspeed_mps:
+        told, size = _stepped(flown, demand)
+        if np.ptp(told[flown.t_s >= flown.t_s[-1] - SLOW_END_S]) > MOVING_SHARE * abs(size):
+            return True
     end = flown.t_s >= flown.t_s[-1] - END_S
     for surface in flown.surface_rad.values():
         left = surface[end] - np.polyval(

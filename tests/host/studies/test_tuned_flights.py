@@ -105,10 +105,11 @@ def test_a_bank_of_thirty_degrees_is_reached_and_held() -> None:
     assert 0.2 < rise_s < 1.5
     assert overshoot < 10.0
     assert settled_s < 3.0
-    assert not moving_at_the_end(flown)
+    assert not moving_at_the_end(flown, demand)
 
 
 def test_a_gain_above_the_margin_is_lost_or_keeps_swinging() -> None:
     known = computed(ultrastick(0.12), "roll").gain_db[0]
-    (flown,) = fly([ultrastick(0.12 * 10 ** ((known + 3.0) / 20.0))], Demand(bank_rad=0.1))
-    assert flown.lost or moving_at_the_end(flown)
+    demand = Demand(bank_rad=0.1)
+    (flown,) = fly([ultrastick(0.12 * 10 ** ((known + 3.0) / 20.0))], demand)
+    assert flown.lost or moving_at_the_end(flown, demand)

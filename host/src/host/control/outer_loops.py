@@ -194,7 +194,7 @@ def px4_height_loop(
     """
     height_s, speed_s, damping, integral, ahead, weight = tuned.values()
     at_height, at_speed = np.clip([2.0 - weight, weight], 0.0, 1.0).tolist()
-    (k00, k01), (k10, k11) = _airspeed_gains(*filtered.values())
+    (k00, k01), (k10, k11) = airspeed_gains(*filtered.values())
 
     def loop(speed_mps: float, w: Array, per_demand: Mapping[str, Spectra]) -> Spectra:
         s = 1j * w
@@ -212,7 +212,7 @@ def px4_height_loop(
     return loop
 
 
-def _airspeed_gains(speed_sd: float, rate_sd: float, process_sd: float) -> Array:
+def airspeed_gains(speed_sd: float, rate_sd: float, process_sd: float) -> Array:
     """Return the gains of a steady Kalman filter of speed and rate, as TECS.cpp solves it."""
     seen, noisy = 1.0 / speed_sd, process_sd / rate_sd**2
     root = math.sqrt(process_sd * (2.0 * seen + noisy))
