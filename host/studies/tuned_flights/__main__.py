@@ -85,7 +85,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--aircraft-drawn", type=int, default=200)
     parser.add_argument("--processes", type=int, default=PROCESSES)
     parser.add_argument("--first", type=int, default=FIRST_SEED)
+    parser.add_argument("--only", action="append", metavar="WORD",
+                        help="cases that begin with it, such as height; repeatable")  # fmt: skip
     asked = parser.parse_args(arguments)
+    only = tuple(asked.only or ("",))
     found = tuned(asked.autopilot, asked.first)
     print(found.to_text(), end="\n\n")
     missing = [one.axis for one in found.axes if one.design.gains is None]
@@ -103,8 +106,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     energy = energy_law(asked.autopilot)
     if energy is None:
         print("No law makes throttle of height and airspeed: neither is stepped.", end="\n\n")
-    drawn = from_covariance(found, asked.aircraft_drawn, asked.first)
-    print(markdown(drawn), flush=True)
+    if not asked.only:
+        drawn = from_covariance(found, asked.aircraft_drawn, asked.first)
+        print(markdown(drawn), flush=True)
     with ProcessPoolExecutor(asked.processes, initializer=prefer_machine_code) as processes:
         for name, gains in sets.items():
             part = 1 if name == "tuned" else OTHER_PART
@@ -112,8 +116,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             pair = found.yaw.problem if found.yaw and "yaw" in gains else None
             outer = energy if name == "tuned" else None
             craft = Craft(laws, gains, found.autopilot.travel_rad, pair, outer)
-            flown = Flights(craft, seeds, processes)
-            print(markdown(flown.table(f"{asked.autopilot}, {name} gains")), flush=True)
+            found_in = Flights(craft, seeds, processes, only).table(
+                f"{asked.autopilot}, {name} gains"
+            )
+            if found_in.rows:
+                print(markdown(found_in), flush=True)
     return 0
 
 
@@ -210,37 +217,39 @@ class Flights:
     craft: Craft
     seeds: range
     processes: Executor
+    only: tuple[str, ...] = ("",)
 
     def table(self, title: str) -> Table:
         """Return one row a case: flights lost or still moving, figures of the step; outliers."""
         rows = tuple(self._rows())
-        margins = [self._margins(axis) for axis in (*AXES, *(["yaw"] if self.craft.pair else []))]
+        axes = (*AXES, *(["yaw"] if self.craft.pair else []))
+        margins = [self._margins(axis) for axis in axes if "margins".startswith(self.only)]
         outside = [line for _, lines in margins for line in lines]
         remark = "\n".join(outside) or "No margin is further from the computed one."
         return Table(title, COLUMNS, (*rows, *(row for row, _ in margins)), remark)
 
     def _rows(self) -> Iterator[tuple[Cell, ...]]:
         for speed in SPEEDS_MPS:
-            steps = {**STEPS, **self._slow_steps(speed)}
-            for step, demand in steps.items():
+            for step, demand in self._steps(speed).items():
                 for gusts in SLOW_GUSTS_MPS if demand.seconds == SLOW_S else GUSTS_MPS:
                     case = f"{step}, {speed:g} m/s, gusts {gusts:g} m/s"
                     yield self._row(case, demand, speed, gusts)
         for name, changes in (("servo at half speed", (SERVO_SHARE, 0.0)),
                               ("CG 3 % back", (1.0, BACK_SHARE))):  # fmt: skip
             speed = SPEEDS_MPS[1]
-            for step, demand in {**STEPS, **self._slow_steps(speed)}.items():
+            for step, demand in self._steps(speed).items():
                 yield self._row(f"{step}, {speed:g} m/s, {name}", demand, speed, 0.0, changes)
 
-    def _slow_steps(self, speed: float) -> dict[str, Demand]:
-        """Return steps of height and of airspeed, towards the trim's from the fastest."""
-        if self.craft.energy is None:
-            return {}
-        faster = AIRSPEED_MPS if speed < SPEEDS_MPS[-1] else -AIRSPEED_MPS
-        return {
-            f"height {HEIGHT_M:g} m": Demand(height_m=HEIGHT_M, seconds=SLOW_S),
-            f"airspeed {faster:+g} m/s": Demand(airspeed_mps=faster, seconds=SLOW_S),
-        }
+    def _steps(self, speed: float) -> dict[str, Demand]:
+        """Return what is asked for; the airspeed steps towards the trim's from the fastest."""
+        steps = dict(STEPS)
+        if self.craft.energy is not None:
+            faster = AIRSPEED_MPS if speed < SPEEDS_MPS[-1] else -AIRSPEED_MPS
+            steps |= {
+                f"height {HEIGHT_M:g} m": Demand(height_m=HEIGHT_M, seconds=SLOW_S),
+                f"airspeed {faster:+g} m/s": Demand(airspeed_mps=faster, seconds=SLOW_S),
+            }
+        return {name: demand for name, demand in steps.items() if name.startswith(self.only)}
 
     def _margins(self, axis: str) -> tuple[tuple[Cell, ...], list[str]]:
         """Return a row of measured minus computed margins, and a line of each outlier."""

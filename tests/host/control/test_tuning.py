@@ -233,6 +233,12 @@ def test_defaults_are_told_by_the_names_of_the_release() -> None:
     assert "AIRSPEED_MIN, AIRSPEED_MAX" in newer
 
 
+def test_what_is_around_inavs_gains_is_said_to_be_unchecked() -> None:
+    said = " ".join(tuning_notes([], AUTOPILOTS["inav"], {}, ()))
+    assert "not checked: nobody read inav's navigation" in said
+    assert "navigation" not in " ".join(tuning_notes([], AUTOPILOTS["px4"], {}, ()))
+
+
 def test_a_file_without_parameters_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "empty.param"
     path.write_text("# nothing\nnan,nan\n", encoding="utf-8")

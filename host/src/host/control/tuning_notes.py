@@ -47,6 +47,8 @@ def tuning_notes(
         yield f"defaults stand for {', '.join(names)}"
     if logged.get("tpa_rate", 0.0) > 0.0 and chosen.name == "inav":
         yield "tpa_rate makes gains follow the throttle, which no aircraft here does: set it to 0"
+    if chosen.outer is None and chosen.words:
+        yield f"paths and heights are not checked: nobody read {chosen.name}'s navigation here"
     for one in own:
         value = logged[one.name]
         if value != one.default and not one.lowest <= value <= one.highest:
