@@ -74,6 +74,7 @@ STEP_S = 1e-3
 RATE_STEP, FORCE_STEP, ANGLE_STEP = 2.664624812204e-4, 1.197100830078e-3, 1.745329251994e-4
 NEUTRAL_US = 1500.0
 SURFACES = (AILERON_STATE, ELEVATOR_STATE, RUDDER)
+SEEN_PULSES = 40  # of four servos: 0.2 s
 PAST_STEPS = 1  # packets: what the gyro's low-pass of 42 Hz makes old
 
 
@@ -227,7 +228,7 @@ def fly_closed(
     count = round((flight.seconds - LAUNCH_S) / PACKET_S) - 4
     for n in range(count):
         at_s = LAUNCH_S + n * PACKET_S
-        start, output, width = bench.sitl.pulses()
+        start, output, width = (each[-SEEN_PULSES:] for each in bench.sitl.pulses())
         ended = start + width <= bench.sitl.now()
         for axis, surface in ((0, 1), (1, 0), (2, 2)):
             mine = np.flatnonzero(ended & (output == axis))

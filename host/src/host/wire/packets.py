@@ -5,7 +5,7 @@ from __future__ import annotations
 import binascii
 import json
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -37,7 +37,7 @@ class Packet:
     fields: tuple[Field, ...]
     always: dict[str, int]
 
-    @property
+    @cached_property
     def dtype(self) -> np.dtype[Any]:
         """Packed little-endian layout of the whole packet."""
         return np.dtype([(field.name, field.numpy_type) for field in self.fields])
