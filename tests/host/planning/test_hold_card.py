@@ -17,6 +17,7 @@ from host.errors import UsageError
 from host.physical.calibration import Calibration, load_calibration
 from host.planning.hold_card import HoldError, HoldGains, hold_part, read_gains
 from host.planning.logger_card import logger_card
+from host.twin.faults import Fault
 from host.twin.recorder.logger_flight import logger_flight
 from host.twin.testcard.cards import Card, Segment
 from host.wire.card_text import card_document, card_lines
@@ -135,8 +136,9 @@ def test_rows_hold_what_they_do_not_move_and_no_further_than_the_card() -> None:
     assert "holds with gains of ultrastick25e, 2026-11-28: aileron" in text
     assert "; holds aileron, elevator" in text
     assert card_document(found)["hold"]["model"] == "ultrastick25e"
-    with pytest.raises(UsageError, match="holds axes"):
-        logger_flight(data, card(), seed=0, recorder=lambda *_: pytest.fail("it was run"))
+    broken = replace(card(), faults=(Fault("imu_off", at_s=50.0),))
+    with pytest.raises(UsageError, match=r"has imu_off.* without faults"):
+        logger_flight(data, broken, seed=0, recorder=lambda *_: pytest.fail("it was run"))
 
 
 @pytest.mark.parametrize(

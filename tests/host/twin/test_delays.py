@@ -25,7 +25,7 @@ from host.twin.outcome.truth_files import summary
 from host.twin.recorder import sitl
 from host.twin.recorder.stimuli import stimuli
 from host.twin.sensors.filters import first_order, vane
-from host.twin.sensors.imu import complementary
+from host.twin.sensors.imu import complementary, turned_to
 from host.twin.sensors.local_flow import AirData, air_data
 from host.twin.sensors.mega_clock import clock_share
 from host.twin.sensors.sensor_delays import FILTERS, GPS_LATENCY_S
@@ -272,7 +272,11 @@ def test_angles_are_carried_on_by_the_delay_of_their_rates() -> None:
     start = np.array([angle[0], 0.0, 0.0])
 
     def late(carry_s: float) -> float:
-        angles, _ = complementary(rates, force, still, still, start, step_s, carry_s)
+        angles, kept = np.zeros_like(rates), np.zeros((3, 3))
+        complementary(
+            rates, force, still, still, step_s, carry_s, 0, len(t), turned_to(start), kept, angles,
+            np.zeros_like(rates),
+        )  # fmt: skip
         true = size * np.sin(w * t)
         return left_over_s(t, true[:, None], t, angles[:, 0], 0)
 

@@ -48,6 +48,7 @@ def fly_steps(
 ) -> int:
     """Integrate steps first..last; return how many were flown before the ground was touched.
 
+    `rest` (m, 17) are the states on the ground, the last one for as long as it lasts.
     `more` (n, 8) takes specific force, angular acceleration, thrust, density; `held` is as in
     `stick_commands`, the rest as in `FlightRecord`.
     """
@@ -97,7 +98,7 @@ def fly_steps(
             more[i, 3:6] = work[0, P : P + 3]
             more[i, 6] = work[0, STATE_COUNT + 3]
         else:
-            x[:] = rest
+            x[:] = rest[min(i, len(rest) - 1)]
             gx, gy, gz = rotate_to_body(x, 0.0, 0.0, frame.gravity_mps2)
             more[i, 0], more[i, 1], more[i, 2] = -gx, -gy, -gz
             more[i, 3:7] = 0.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from host.aircraft.trim import Trim, solve
 from host.instrument.instrument_errors import InstrumentErrors
 from host.twin.flight.draws import GROUPS, Draws, draw, true_airframe
 from host.twin.flight.flight_steps import fly_steps
+from host.twin.flight.ground_tilts import tilted
 from host.twin.flight.pilot import SWITCH_DIRECT_US, Schedule, gains, schedule
 from host.twin.flight.stick_commands import (
     IDLE_US,
@@ -93,6 +94,11 @@ class FlightRecord:
         return float(rotate_to_ned(self.states[-1], *self.states[-1, :3])[2])
 
 
+# Gets the flight, filled as it is flown, and the additions (n, 3), us, that it is to fill. Returns
+# a function that is told how many steps are flown and says up to which to fly on.
+Beside = Callable[[FlightRecord, Array], Callable[[int], int]]
+
+
 def fly(
     card: Card,
     *,
@@ -103,6 +109,7 @@ def fly(
     instrument_seed: int | None = None,
     noise_seed: int | None = None,
     added_us: Array | None = None,
+    beside: Beside | None = None,
 ) -> FlightRecord:
     """Fly a card.
 
@@ -125,6 +132,9 @@ def fly(
     added_us : (n, 3) array, optional
         What the logger adds to aileron, elevator and rudder at each step: it flies the inputs, of
         a card made by `flown_by_logger`. Of (0, 3): nothing yet.
+    beside : callable, optional
+        The logger in the same loop, of such a card that holds axes: see `Beside`. On the ground the
+        pilot tilts the aircraft.
 
     Returns
     -------
@@ -160,42 +170,32 @@ def fly(
     )
     wanted = card.flight.airspeed_mps or plane.scalar("trim.airspeed_mps")
     trim = solve(frame, wanted, density_kgpm3=density_kgpm3(atmosphere, card.flight.height_m))
-    plan = schedule(card, wanted, STEP_S, rng_pilot, by_logger=added_us is not None)
+    by_logger = added_us is not None or beside is not None
+    plan = schedule(card, wanted, STEP_S, rng_pilot, by_logger=by_logger, holds=beside is not None)
     n = len(plan.orders.attention)
     hands = _hands(card, frame, trim, draws, n)
     wind = np.array([card.air.wind_north_mps, card.air.wind_east_mps, 0.0])
     launch, rest = _start(card, trim, wind)
+    rest = tilted(rest, hands.ground_steps, STEP_S) if beside is not None else rest[None]
 
     period = hands.period_steps
     frames = -(-n // period)
     starts = np.arange(frames, dtype=np.float64) * RC_PERIOD_S
     link, preset = _link(card, starts)
+    if beside is not None:
+        added_us = np.zeros((n, 3))
     radio = Radio(link, preset, np.zeros((0, 3)) if added_us is None else added_us)
     turbulence = air_model.turbulence(card.air, card.flight.height_m)
     noise = rng_air.standard_normal((n if card.air.turbulence_mps > 0.0 else 1, 4))
     stick_noise = rng_radio.standard_normal((frames, 8 + RC_CHANNELS))
     states, air, more = np.empty((n, STATE_COUNT)), np.empty((n, 9)), np.empty((n, 8))
     pulses = np.zeros((frames, RC_CHANNELS))
-    x, z, command = rest.copy(), np.zeros(GUST_STATES), trim.command.copy()
+    x, z, command = rest[-1].copy(), np.zeros(GUST_STATES), trim.command.copy()
     held = np.zeros(9)
     held[8] = math.asin(
         max(-1.0, min(1.0, -2 * (launch[Q1] * launch[Q3] - launch[Q0] * launch[Q2])))
     )
-    done = 0
-    chunk = max(period * 50, n // 100 // period * period)
-    for first in range(0, n, chunk):
-        last = min(first + chunk, n)
-        done = fly_steps(
-            frame, hands, plan.orders, radio, atmosphere, turbulence, trim.command, launch, rest,
-            wind, noise, stick_noise, STEP_S, first, last, x, z, held, command, states, more, air,
-            pulses,
-        )  # fmt: skip
-        if progress is not None:
-            progress(done / n)
-        if done < last:
-            break
-    rows = -(-done // period)
-    return FlightRecord(
+    flown = FlightRecord(
         card=card,
         aircraft=plane,
         seed=noise_seed,
@@ -204,7 +204,37 @@ def fly(
         trim=trim,
         schedule=plan,
         atmosphere=atmosphere,
-        t_s=np.arange(done, dtype=np.float64) * STEP_S,
+        t_s=np.arange(n, dtype=np.float64) * STEP_S,
+        states=states,
+        specific_force_mps2=more[:, 0:3],
+        angular_acceleration_radps2=more[:, 3:6],
+        thrust_n=more[:, 6],
+        density_kgpm3=more[:, 7],
+        air=air,
+        pulses_us=pulses,
+        pulse_starts_s=starts,
+    )
+    chunk = max(period * 50, n // 100 // period * period)
+    follow = None if beside is None else beside(flown, radio.added_us)
+    done = first = 0
+    while first < n:
+        last = min(first + chunk if follow is None else follow(first), n)
+        done = fly_steps(
+            frame, hands, plan.orders, radio, atmosphere, turbulence, trim.command, launch, rest,
+            wind, noise, stick_noise, STEP_S, first, last, x, z, held, command, states, more, air,
+            pulses,
+        )  # fmt: skip
+        if progress is not None:
+            progress(done / n)
+        first = last
+        if done < last:
+            break
+    if follow is not None:
+        follow(done)
+    rows = -(-done // period)
+    return replace(
+        flown,
+        t_s=flown.t_s[:done],
         states=states[:done],
         specific_force_mps2=more[:done, 0:3],
         angular_acceleration_radps2=more[:done, 3:6],

@@ -11,6 +11,7 @@ import numpy as np
 from host.aircraft.airframe import Airframe, Array
 from host.aircraft.linearisation import linearise
 from host.aircraft.trim import Trim
+from host.twin.flight.ground_tilts import PITCHED_S, ROLLED_S, SHOWN_S, TILTING_S
 from host.twin.testcard.cards import (
     AXES,
     Card,
@@ -107,6 +108,7 @@ def schedule(
     rng: np.random.Generator,
     *,
     by_logger: bool = False,
+    holds: bool = False,
 ) -> Schedule:
     """Turn a card into the pilot's program, with the errors of a human hand.
 
@@ -120,6 +122,8 @@ def schedule(
     by_logger : bool
         The logger flies the inputs of a card made by `flown_by_logger`: the pilot enables it on
         the ground, moves the switch and lets go of the sticks.
+    holds : bool
+        It holds axes: behind the sign the pilot gives stick against each tilt.
 
     Returns
     -------
@@ -139,6 +143,8 @@ def schedule(
     ahead = AIM_M * np.array([math.cos(heading), math.sin(heading)])
     if by_logger:
         _enable(t, result)
+    if holds:
+        _prove(t, result)
     inputs: list[tuple[Segment, float, float, float]] = []
     at = card.flight.ground_s
     for s in card.segments:
@@ -182,6 +188,16 @@ def _enable(t: Array, into: Orders) -> None:
     sign = _span(t, SIGN_S, SIGN_END_S)
     into.program[sign, AXES.index("aileron")] = FULL_RAD
     into.program[sign, AXES.index("rudder")] = -FULL_RAD
+
+
+def _prove(t: Array, into: Orders) -> None:
+    """Give stick against right wing down and nose up, on the ground."""
+    for begin_s, axis, stick_rad in (
+        (ROLLED_S, "aileron", -FULL_RAD),
+        (PITCHED_S, "elevator", FULL_RAD),
+    ):
+        against = _span(t, begin_s + TILTING_S, begin_s + TILTING_S + SHOWN_S)
+        into.program[against, AXES.index(axis)] = stick_rad
 
 
 def _leave_to_logger(

@@ -149,7 +149,11 @@ def simulate(
     recording: sitl.Recording | None = None
     if flight_card:
         record, given, recording = logger_flight(
-            flight_card, card, seed=seed, aircraft=aircraft, recorder=recorder
+            flight_card,
+            card,
+            seed=seed,
+            aircraft=aircraft,
+            recorder=recorder,
         )
     else:
         share = partial(progress, "fly")

@@ -2,7 +2,8 @@
 
 The aircraft flies with the inputs that the logger added, then the recorder runs through that
 flight, until neither changes. The inputs follow from clock and card, so two rounds are enough, or
-three where a limit ended an input.
+three where a limit ended an input. A card that holds axes feeds back: there the recorder runs
+beside the aircraft (`closed_loop`), and only what its limits watch is a round older.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from host.errors import UsageError
 from host.log import read_log
 from host.twin.flight.fly import STEP_S, FlightRecord, fly
 from host.twin.flight.pilot import WINDOW_TAIL_S, Window
-from host.twin.recorder.sitl import Recording
+from host.twin.recorder.closed_loop import ClosedLoop
+from host.twin.recorder.sitl import Recording, recorder_rate_hz
 from host.twin.recorder.stimuli import Stimuli, stimuli
 from host.twin.sensors.local_flow import air_data
 from host.twin.sensors.mega_clock import TICKS_PER_S, clock_share
@@ -73,7 +75,8 @@ def logger_flight(
     card : Card
     seed : int
     recorder : callable
-        Runs the recorder with that flight card through the stimuli of a flight.
+        Runs the recorder with that flight card through the stimuli of a flight. Of a card that
+        holds axes the one on this computer flies along, and this one is not called.
     aircraft : Aircraft, optional
         In place of the card's.
 
@@ -87,34 +90,47 @@ def logger_flight(
     Raises
     ------
     UsageError
-        The flight card is not of this card or holds axes, nothing was recorded, or no agreement.
+        The flight card is not of this card, nothing was recorded, or no agreement.
     """
     wrong = card_faults(flight_card)
     if wrong:
         raise UsageError(f"no good flight card: {wrong[0]}")
     rows = read_card(flight_card)
-    if rows.hold is not None:
-        # Aircraft and recorder are run in turns: what is fed back would never settle.
+    holds = rows.hold is not None
+    if holds and card.faults:
         raise UsageError(
-            "this flight card holds axes, and aircraft and recorder fly one after the other here:"
-            " make it without --hold to simulate its inputs"
+            f"{card.name} has {card.faults[0].kind}, and a flight card that holds axes is flown"
+            " without faults here: leave them out, or make it without --hold"
         )
     _same_inputs(rows, card)
     plane = aircraft or load(card.aircraft)
     speed = card.flight.airspeed_mps or plane.scalar("trim.airspeed_mps")
-    legs = flown_by_logger(card, speed, float(rows.head["distance_max_m"]))
+    legs = flown_by_logger(card, speed, float(rows.head["distance_max_m"]), holds=holds)
     added = np.zeros((0, len(AXES)))
     before: list[LoggedInput] | None = None
-    for _ in range(MOST_ROUNDS):
+    if holds:
         flown = fly(legs, seed=seed, aircraft=plane, added_us=added)
         given = stimuli(flown, air_data(flown))
-        recording = recorder(flown, given)
+    for _ in range(MOST_ROUNDS):
+        if holds:
+            loop = ClosedLoop(
+                given, rate_hz=recorder_rate_hz(card.flight.rate_hz), aircraft=plane.name,
+                flight_card=flight_card, seed=seed,
+            )  # fmt: skip
+            flown = fly(legs, seed=seed, aircraft=plane, beside=loop.beside)
+            given, recording = stimuli(flown, air_data(flown)), loop.recording()
+        else:
+            flown = fly(legs, seed=seed, aircraft=plane, added_us=added)
+            given = stimuli(flown, air_data(flown))
+            recording = recorder(flown, given)
         if not recording.log:
             raise UsageError(f"nothing was recorded: {recording.name}")
         logged = logged_inputs(recording.log)
         if before is not None and _agree(before, logged):
             return _with_windows(flown, logged, rows), given, recording
-        before, added = logged, added_us(flown, given, recording, logged)
+        before = logged
+        if not holds:
+            added = added_us(flown, given, recording, logged)
     raise UsageError("aircraft and logger do not settle on what the logger adds")
 
 

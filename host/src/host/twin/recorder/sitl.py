@@ -114,20 +114,33 @@ def record(
     UsageError
         No library, or the recorder did not make a file.
     """
+    sitl, image = ready(given, rate_hz, aircraft, faults, flight_card)
+    try:
+        return _record(sitl, image, given, faults, seed, progress)
+    finally:
+        sitl.close()
+
+
+def ready(
+    given: Stimuli, rate_hz: int, aircraft: str, faults: Sequence[Fault], flight_card: bytes
+) -> tuple[Sitl, mmap.mmap]:
+    """Return the recorder, off, as `record` has it, with the image of a card that has room."""
     check_duration(given)
     room_s = given.duration / TICKS_PER_S + 30.0
     blocks = round(room_s * BLOCKS_PER_S * max(rate_hz / 100.0, 0.5))
     image = card_image(faults, blocks)
+    settings = Sitl(recorder_library())
+    kinds = {fault.kind for fault in faults}
+    configure(settings, rate_hz, aircraft, damaged="settings_damaged" in kinds)
+    content = settings.eeprom()
+    if flight_card:
+        content = eeprom_with_card(content, flight_card)
     sitl = Sitl(recorder_library())
     sitl.set_file_blocks(blocks)
-    try:
-        kinds = {fault.kind for fault in faults}
-        configure(sitl, rate_hz, aircraft, damaged="settings_damaged" in kinds)
-        if flight_card:
-            sitl.set_eeprom(eeprom_with_card(sitl.eeprom(), flight_card))
-        return _record(sitl, image, given, faults, seed, progress)
-    finally:
-        sitl.close()
+    sitl.set_eeprom(content)
+    if "card_absent" not in kinds:
+        sitl.insert_card(image, CARD_ID)
+    return sitl, image
 
 
 def check_duration(given: Stimuli) -> None:
@@ -155,9 +168,6 @@ def _record(
     seed: int,
     progress: Callable[[float], None],
 ) -> Recording:
-    kinds = {fault.kind for fault in faults}
-    if "card_absent" not in kinds:
-        sitl.insert_card(image, CARD_ID)
     for fault in faults:
         if fault.kind == "clock_wrap":
             offset_us = (1 << 32) - round(fault.at_s * 1e6)
@@ -165,7 +175,7 @@ def _record(
     cuts = [round(f.at_s * TICKS_PER_S) for f in faults if f.kind == "power_cut"]
     end = min([given.duration, *cuts])
     give_stimuli(sitl, given, end)
-    if "telemetry_flood" in kinds:
+    if any(fault.kind == "telemetry_flood" for fault in faults):
         raise UsageError("telemetry_flood: here an interrupt takes no time; use --firmware avr")
     actions = [(round(a.at_s * TICKS_PER_S), a) for a in recorder_actions(faults)]
     sitl.power_on()
@@ -176,10 +186,16 @@ def _record(
             if at == mark:
                 _act(sitl, given, at, action)
         progress(mark / end)
+    return closed(sitl, image, given, end, faults, seed)
+
+
+def closed(
+    sitl: Sitl, image: mmap.mmap, given: Stimuli, end: int, faults: Sequence[Fault], seed: int
+) -> Recording:
+    """Pull the battery at tick `end`; the next power-on, at the bench, closes the file."""
+    sitl.run_until(end)
     state = sitl.state()
     servos = np.rec.fromarrays(sitl.pulses(), dtype=SERVO_PULSE)
-
-    # The pilot pulls the battery; the next power-on, at the bench, closes the file.
     sitl.power_cut(seed & 0xFFFFFFFF)
     close_start = end + TICKS_PER_S
     sitl.run_until(close_start)

@@ -21,15 +21,23 @@ def first_order(x: Array, tau_s: float, step_s: float) -> Array:
     An input held over each step would come out half a step later than `tau_s` says.
     """
     y = np.empty_like(x)
+    y[0] = x[0]
+    go_on_first_order(x, y, 1, x.shape[0], tau_s, step_s)
+    return y
+
+
+@compiled_fast
+def go_on_first_order(
+    x: Array, y: Array, first: int, last: int, tau_s: float, step_s: float
+) -> None:
+    """Fill y[first:last] of `first_order`, whose samples before are there."""
     if tau_s <= 0.0:
-        y[:] = x
-        return y
+        y[first:last] = x[first:last]
+        return
     keep = math.exp(-step_s / tau_s)
     mean = (1.0 - keep) * tau_s / step_s
-    y[0] = x[0]
-    for i in range(1, x.shape[0]):
+    for i in range(first, last):
         y[i] = keep * y[i - 1] + (mean - keep) * x[i - 1] + (1.0 - mean) * x[i]
-    return y
 
 
 @compiled_fast

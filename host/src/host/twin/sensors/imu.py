@@ -12,7 +12,7 @@ from host.aircraft.attitude import euler, to_body
 from host.compiled import compiled_fast
 from host.constants import GRAVITY_MPS2
 from host.twin.flight.fly import STEP_S, FlightRecord
-from host.twin.sensors.filters import delayed, first_order
+from host.twin.sensors.filters import delayed, go_on_first_order
 from host.twin.sensors.local_flow import AirData
 from host.twin.sensors.sensor_delays import FILTERS, sensor_delays
 
@@ -26,6 +26,7 @@ ANGLE_LSB_RAD = math.radians(0.01)
 TILT_GAIN_PERS = 0.2
 HEADING_GAIN_PERS = 0.3
 BIAS_GAIN_PERS2 = 0.005
+SPEED_LATE_S = 0.3  # of a GPS
 FIELD_NED_T = np.array([30.0e-6, 2.2e-6, 32.0e-6])  # near Cairo, declination 4.1 deg (thesis)
 
 
@@ -91,32 +92,30 @@ def complementary(
     force: Array,
     heading: Array,
     speed: Array,
-    start: Array,
     step_s: float,
     carry_s: float,
-) -> tuple[Array, Array]:
-    """Run the attitude filter; return phi, theta, psi (m, 3) and the bias estimate (m, 3).
+    first: int,
+    last: int,
+    c: Array,
+    kept: Array,
+    angles: Array,
+    biases: Array,
+) -> None:
+    """Run the attitude filter through the samples first..last: phi, theta, psi into `angles`
+    (m, 3), the bias estimate into `biases` (m, 3).
 
     `rates` (m, 3) rad/s, `force` (m, 3) m/s2, `heading` (m,) rad from the magnetometer, `speed`
-    (m,) m/s for the centripetal correction, `start` (3,) first angles. As in the IMU's firmware the
-    angles are carried on by the nominal delay `carry_s` of the gyro.
+    (m,) m/s for the centripetal correction. `c` (3, 3), body to north-east-down, and `kept` (3, 3),
+    bias, correction and rate of the sample before, are what it remembers. As in the IMU's firmware
+    the angles are carried on by the nominal delay `carry_s` of the gyro.
     """
-    m = rates.shape[0]
-    angles, biases = np.empty((m, 3)), np.empty((m, 3))
-    c = np.empty((3, 3))  # body to north-east-down
-    sp, cp = math.sin(start[0]), math.cos(start[0])
-    st, ct = math.sin(start[1]), math.cos(start[1])
-    ss, cs = math.sin(start[2]), math.cos(start[2])
-    c[0, 0], c[0, 1], c[0, 2] = ct * cs, sp * st * cs - cp * ss, cp * st * cs + sp * ss
-    c[1, 0], c[1, 1], c[1, 2] = ct * ss, sp * st * ss + cp * cs, cp * st * ss - sp * cs
-    c[2, 0], c[2, 1], c[2, 2] = -st, sp * ct, cp * ct
-    bias, e, before = np.zeros(3), np.zeros(3), rates[0].copy()
-    for i in range(m):
+    bias, e, before = kept[0], kept[1], kept[2]
+    for i in range(first, last):
         now = rates[i] - bias
         if i > 0:
             w = (0.5 * (before + now) + e) * step_s
-            c = turned(c, w[0], w[1], w[2])
-        before = now
+            c[:, :] = turned(c, w[0], w[1], w[2])
+        before[:] = now
         ahead = turned(c, now[0] * carry_s, now[1] * carry_s, now[2] * carry_s)
         angles[i, 0] = math.atan2(ahead[2, 1], ahead[2, 2])
         angles[i, 1] = -math.asin(min(max(ahead[2, 0], -1.0), 1.0))
@@ -139,7 +138,19 @@ def complementary(
         for k in range(3):
             e[k] += off * c[2, k]
             bias[k] -= BIAS_GAIN_PERS2 / TILT_GAIN_PERS * e[k] * step_s
-    return angles, biases
+
+
+@compiled_fast
+def turned_to(start: Array) -> Array:
+    """Return the matrix (3, 3) body to north-east-down of phi, theta, psi."""
+    c = np.empty((3, 3))
+    sp, cp = math.sin(start[0]), math.cos(start[0])
+    st, ct = math.sin(start[1]), math.cos(start[1])
+    ss, cs = math.sin(start[2]), math.cos(start[2])
+    c[0, 0], c[0, 1], c[0, 2] = ct * cs, sp * st * cs - cp * ss, cp * st * cs + sp * ss
+    c[1, 0], c[1, 1], c[1, 2] = ct * ss, sp * st * ss + cp * cs, cp * st * ss - sp * cs
+    c[2, 0], c[2, 1], c[2, 2] = -st, sp * ct, cp * ct
+    return c
 
 
 @compiled_fast
@@ -204,66 +215,141 @@ def imu(
     -------
     Imu
     """
-    switches, draws = record.card.sensors, record.draws
-    t, n = record.t_s, len(record.t_s)
-    place = np.zeros(3)
-    if switches.position:
-        place = record.aircraft.vector("sensors.imu_m") + draws.vector("imu_m") - record.frame.cg_m
-    noise = rng.standard_normal((n, 6))
-    band = math.sqrt(0.5 / STEP_S) if switches.noise else 0.0  # white up to half the sampling rate
-    rates, force = sensed_motion(
-        record.states,
-        record.specific_force_mps2,
-        record.angular_acceleration_radps2,
-        place,
-        _rotation(draws.vector("misalignment_rad")),
-        1.0 + draws.vector("gyro_scale_share"),
-        draws.vector("gyro_bias_radps"),
-        1.0 + draws.vector("accel_scale_share"),
-        draws.vector("accel_bias_mps2"),
-        noise,
-        GYRO_NOISE_RADPS_RTHZ * band,
-        ACCEL_NOISE_MPS2_RTHZ * band,
-    )
-    if switches.imu_filter:
-        late = sensor_delays(record.aircraft, draws, dlpf)
-        gyro_hz, accel_hz = (bandwidth_hz for bandwidth_hz, _ in FILTERS[dlpf])
-        rates = _low_pass(rates, t, at_s, gyro_hz, late["gyro"])
-        force = _low_pass(force, t, at_s, accel_hz, late["accelerometer"])
-    else:
-        rates, force = delayed(t, rates, 0.0, at_s), delayed(t, force, 0.0, at_s)
+    taking = ImuSampling(record, at_s, dlpf, rng)
+    taking.take(len(at_s))
+    return taking.samples
 
-    attitudes = record.states[:, Q0 : Q3 + 1]
-    true_angles = np.column_stack([np.unwrap(a) for a in euler(attitudes)])
-    nearest = np.minimum(np.round(at_s / STEP_S).astype(np.int64), n - 1)
-    magnetic = to_body(attitudes[nearest]) @ FIELD_NED_T
-    magnetic = magnetic + rng.standard_normal(magnetic.shape) * (2e-7 if switches.noise else 0.0)
-    angles = delayed(t, true_angles, 0.0, at_s)
-    bias = np.zeros_like(rates)
-    if switches.attitude_filter:
-        # The compass is read late and has a slow error of its own: 2 deg.
-        heading = angles[:, 2] + np.deg2rad(2.0) * np.sin(angles[:, 2])
-        ground = np.linalg.norm(
-            np.gradient(record.states[:, NORTH : DOWN + 1], STEP_S, axis=0), axis=1
+
+class ImuSampling:
+    """Takes the samples one after the other: also while the flight is flown.
+
+    Attributes
+    ----------
+    samples : Imu
+        Zero where not taken yet.
+    """
+
+    def __init__(
+        self, record: FlightRecord, at_s: Array, dlpf: int, rng: np.random.Generator
+    ) -> None:
+        n, m = len(record.t_s), len(at_s)
+        self._record, self._switches, draws = record, record.card.sensors, record.draws
+        self._place = np.zeros(3)
+        if self._switches.position:
+            self._place = (
+                record.aircraft.vector("sensors.imu_m") + draws.vector("imu_m") - record.frame.cg_m
+            )
+        self._noise = rng.standard_normal((n, 6))
+        # White up to half the sampling rate.
+        self._band = math.sqrt(0.5 / STEP_S) if self._switches.noise else 0.0
+        self._lag = [(0.0, 0.0), (0.0, 0.0)]
+        if self._switches.imu_filter:
+            late = sensor_delays(record.aircraft, draws, dlpf)
+            names = zip(("gyro", "accelerometer"), FILTERS[dlpf], strict=True)
+            self._lag = [
+                (min(1.0 / (2.0 * math.pi * hz), late[name]), late[name]) for name, (hz, _) in names
+            ]
+        self._field_noise = rng.standard_normal((m, 3)) * (2e-7 if self._switches.noise else 0.0)
+        self._step_s = float(np.median(np.diff(at_s))) if m > 1 else STEP_S
+        self._carry_s = FILTERS[dlpf][0][1] if self._switches.imu_filter else 0.0
+        self._c, self._kept = np.zeros((3, 3)), np.zeros((3, 3))
+        self._heading, self._speed = np.zeros(m), np.zeros(m)
+        # Of every step: as sensed, behind the low-pass, true angles unwrapped, ground speed.
+        self._sensed = [np.zeros((n, 3)), np.zeros((n, 3))]
+        self._slow = [np.zeros((n, 3)), np.zeros((n, 3))]
+        self._angles, self._ground = np.zeros((n, 3)), np.zeros(n)
+        self._steps = self._next = 0
+        self._exact = [np.zeros((m, 3)), np.zeros((m, 3))]
+        self.samples = Imu(
+            at_s, dlpf, np.zeros((m, 3)), np.zeros((m, 3)), np.zeros((m, 3)), np.zeros((m, 3)),
+            np.zeros((m, 3)), np.zeros((m, 9), dtype=np.int16),
+        )  # fmt: skip
+
+    def take(self, last: int) -> None:
+        """Take the samples before number `last`; the motion is there up to the step behind each."""
+        first, self._next = self._next, last
+        if first >= last:
+            return
+        out, switches = self.samples, self._switches
+        at_s = out.t_s[first:last]
+        self._sense(min(math.ceil(float(at_s[-1]) / STEP_S) + 1, len(self._record.t_s)))
+        rows = slice(first, last)
+        for k, (tau_s, late_s) in enumerate(self._lag):
+            self._exact[k][rows] = self._delayed(self._slow[k], late_s - tau_s, at_s)
+        nearest = np.minimum(np.round(at_s / STEP_S).astype(np.int64), len(self._record.t_s) - 1)
+        attitudes = self._record.states[nearest, Q0 : Q3 + 1]
+        out.magnetic_t[rows] = to_body(attitudes) @ FIELD_NED_T + self._field_noise[rows]
+        angles = self._delayed(self._angles, 0.0, at_s)
+        if switches.attitude_filter:
+            # The compass is read late and has a slow error of its own: 2 deg.
+            self._heading[rows] = angles[:, 2] + np.deg2rad(2.0) * np.sin(angles[:, 2])
+            self._speed[rows] = self._delayed(self._ground, SPEED_LATE_S, at_s)
+            if first == 0:
+                self._c[:] = turned_to(angles[0])
+            complementary(
+                self._exact[0], self._exact[1], self._heading, self._speed, self._step_s,
+                self._carry_s, first, last,
+                self._c, self._kept, out.attitude_rad, out.bias_radps,
+            )  # fmt: skip
+        else:
+            out.attitude_rad[rows] = angles
+        turn = out.attitude_rad[rows, 2]
+        out.attitude_rad[rows, 2] = np.mod(turn + np.pi, 2.0 * np.pi) - np.pi
+        exact = [e[rows] for e in self._exact]
+        raw = np.column_stack(
+            [exact[0] / GYRO_LSB_RADPS, exact[1] / ACCEL_LSB_MPS2,
+             out.attitude_rad[rows] / ANGLE_LSB_RAD]
+        )  # fmt: skip
+        raw = np.clip(np.round(raw), -32767, 32767)
+        if switches.quantisation:
+            exact = [raw[:, :3] * GYRO_LSB_RADPS, raw[:, 3:6] * ACCEL_LSB_MPS2]
+        out.rates_radps[rows], out.force_mps2[rows] = exact
+        out.raw[rows] = raw.astype(np.int16)
+
+    def _sense(self, last: int) -> None:
+        """Fill what is sensed before step `last`."""
+        first, self._steps = self._steps, last
+        if first >= last:
+            return
+        record, draws, part = self._record, self._record.draws, slice(first, last)
+        self._sensed[0][part], self._sensed[1][part] = sensed_motion(
+            record.states[part],
+            record.specific_force_mps2[part],
+            record.angular_acceleration_radps2[part],
+            self._place,
+            _rotation(draws.vector("misalignment_rad")),
+            1.0 + draws.vector("gyro_scale_share"),
+            draws.vector("gyro_bias_radps"),
+            1.0 + draws.vector("accel_scale_share"),
+            draws.vector("accel_bias_mps2"),
+            self._noise[part],
+            GYRO_NOISE_RADPS_RTHZ * self._band,
+            ACCEL_NOISE_MPS2_RTHZ * self._band,
         )
-        ground[record.t_s < record.card.flight.ground_s + 2 * STEP_S] = 0.0
-        speed = delayed(t, ground, 0.3, at_s)
-        step = float(np.median(np.diff(at_s)))
-        carry = FILTERS[dlpf][0][1] if switches.imu_filter else 0.0
-        angles, bias = complementary(rates, force, heading, speed, angles[0], step, carry)
-    angles[:, 2] = np.mod(angles[:, 2] + np.pi, 2.0 * np.pi) - np.pi
-    raw = np.column_stack([rates / GYRO_LSB_RADPS, force / ACCEL_LSB_MPS2, angles / ANGLE_LSB_RAD])
-    raw = np.clip(np.round(raw), -32767, 32767)
-    if switches.quantisation:
-        rates, force = raw[:, :3] * GYRO_LSB_RADPS, raw[:, 3:6] * ACCEL_LSB_MPS2
-    return Imu(at_s, dlpf, rates, force, angles, bias, magnetic, raw.astype(np.int16))
+        begin = max(first, 1)
+        for sensed, slow, (tau_s, _) in zip(self._sensed, self._slow, self._lag, strict=True):
+            if first == 0:
+                slow[0] = sensed[0]
+            for k in range(3):
+                go_on_first_order(sensed[:, k], slow[:, k], begin, last, tau_s, STEP_S)
+        angles = np.column_stack(euler(record.states[part, Q0 : Q3 + 1]))
+        if first > 0:
+            angles = np.concatenate([self._angles[first - 1 : first], angles])
+        self._angles[part] = np.unwrap(angles, axis=0)[-(last - first) :]
+        # Between the steps before and behind: what is needed is as old as the compass.
+        north = record.states[max(begin - 2, 0) : last, NORTH : DOWN + 1]
+        begin = last - len(north) + 1
+        self._ground[begin : last - 1] = np.linalg.norm(
+            (north[2:] - north[:-2]) / (2.0 * STEP_S), axis=1
+        )
+        begun_s = record.card.flight.ground_s + 2 * STEP_S
+        self._ground[: np.searchsorted(record.t_s, begun_s)] = 0.0
 
-
-def _low_pass(x: Array, t: Array, at_s: Array, bandwidth_hz: float, late_s: float) -> Array:
-    """Return x behind a lag of the filter's bandwidth and a pure delay for the rest of `late_s`."""
-    tau = min(1.0 / (2.0 * math.pi * bandwidth_hz), late_s)
-    slow = np.column_stack([first_order(x[:, k], tau, STEP_S) for k in range(x.shape[1])])
-    return delayed(t, slow, late_s - tau, at_s)
+    def _delayed(self, x: Array, late_s: float, at_s: Array) -> Array:
+        """Return `delayed` of all steps; a part of them has what it needs."""
+        low = max(int((float(at_s[0]) - late_s) / STEP_S) - 2, 0)
+        high = max(int((float(at_s[-1]) - late_s) / STEP_S) + 3, low + 2)
+        return delayed(self._record.t_s[low:high], x[low:high], late_s, at_s)
 
 
 def _rotation(small_rad: Array) -> Array:

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from host.aircraft.airframe import Array
 from host.twin.faults import Fault
 from host.twin.flight.fly import FlightRecord
-from host.twin.sensors.imu import Imu, imu
+from host.twin.sensors.imu import Imu, ImuSampling
 from host.twin.sensors.local_flow import AirData
-from host.twin.sensors.mega_clock import TICKS_PER_S, ticks
+from host.twin.sensors.mega_clock import TICKS_PER_S, Ticks, ticks
 from host.twin.sensors.sensor_delays import dlpf_for
 from host.wire.packets import packet
 from host.wire.schema_text import packed_schema
@@ -55,47 +55,72 @@ def imu_packets(
     Imu, list of ImuPacket
         Without faults one packet per sample.
     """
-    own_clock = 1.0
-    if record.card.sensors.clock_error:
-        own_clock += record.draws.scalar("imu_clock_share")
-    at = np.arange(0.05, record.t_s[-1] - 0.02, 1.0 / RATE_HZ / own_clock)
-    sample = imu(record, data, at, dlpf_for(record.card.flight.rate_hz), rng)
-    age_s = AGE_S + AGE_JITTER_S * rng.random(len(at))
-    rows = _rows(sample, at, age_s, own_clock)
+    sender = ImuSender(record, rng)
+    at, own_clock = sender.at_s, sender.own_clock
+    rows = sender.rows(len(at))
     # A stream of its own: a fault changes nothing else.
     chance = np.random.default_rng([record.seed, 12])
     sent = np.ones(len(at), dtype=bool)
     for fault in record.card.faults:
         sent &= _fail(fault, at, rows, own_clock, chance)
-    starts = ticks(record, at + age_s)
     packets = [
-        _transfer(start, data)
+        transfer(start, data)
         for start, data, leaves in zip(
-            starts.tolist(), packet("imu").sealed(rows), sent.tolist(), strict=True
+            sender.starts.tolist(), packet("imu").sealed(rows), sent.tolist(), strict=True
         )
         if leaves
     ]
     for fault in record.card.faults:
         packets = _damage(fault, at[sent], packets, chance)
-    return sample, packets
+    return sender.sampling.samples, packets
 
 
-def _rows(sample: Imu, at: Array, age_s: Array, own_clock: float) -> NDArray[np.void]:
-    count = np.arange(len(at))
+class ImuSender:
+    """Samples and sends, as far as the flight is flown.
+
+    Attributes
+    ----------
+    at_s : (m,) array
+        True times of the samples.
+    starts : (m,) array
+        Of their packets, in ticks.
+    own_clock : float
+        Its seconds in a true one.
+    sampling : ImuSampling
+    """
+
+    def __init__(self, record: FlightRecord, rng: np.random.Generator) -> None:
+        self.own_clock = 1.0
+        if record.card.sensors.clock_error:
+            self.own_clock += record.draws.scalar("imu_clock_share")
+        self.at_s = np.arange(0.05, record.t_s[-1] - 0.02, 1.0 / RATE_HZ / self.own_clock)
+        dlpf = dlpf_for(record.card.flight.rate_hz)
+        self.sampling = ImuSampling(record, self.at_s, dlpf, rng)
+        self._age_s = AGE_S + AGE_JITTER_S * rng.random(len(self.at_s))
+        self.starts = ticks(record, self.at_s + self._age_s)
+        self._sent = 0
+
+    def rows(self, last: int) -> NDArray[np.void]:
+        """Return the packets, not sealed, of the samples since the last call before `last`."""
+        first, self._sent = self._sent, last
+        self.sampling.take(last)
+        count = np.arange(first, last)
+        return _rows(self.sampling.samples, count, self._age_s[first:last], self.own_clock)
+
+
+def _rows(sample: Imu, count: Ticks, age_s: Array, own_clock: float) -> NDArray[np.void]:
+    at, raw = sample.t_s[count], sample.raw[count]
     aux = np.zeros((len(at), 3), dtype=np.int64)
     kinds = count % 12  # magnetometer at 16.7 Hz, bias and status at the same pace
     schema = packed_schema()
     mag_step_t = schema.by_name["mag"].field("mx").scale
     bias_step_radps = schema.by_name["attitude"].field("bias_p").scale
-    aux[kinds == 0] = np.round(sample.magnetic_t[kinds == 0] / mag_step_t)
-    aux[kinds == 4] = np.round(sample.bias_radps[kinds == 4] / bias_step_radps)
+    # Between its turns the magnetometer is repeated, as the IMU keeps its last reading.
+    aux[:] = np.round(sample.magnetic_t[count - kinds] / mag_step_t)
+    aux[kinds == 4] = np.round(sample.bias_radps[count[kinds == 4]] / bias_step_radps)
     aux[kinds == 8] = (3150, 0x54 + 256 * sample.dlpf, 1)
-    # Between their turns the magnetometer is repeated, as the IMU keeps its last reading.
-    held = np.maximum.accumulate(np.where(kinds == 0, count, 0))
-    repeat = ~np.isin(kinds, (0, 4, 8))
-    aux[repeat] = aux[held[repeat]]
-    gyro_full = np.abs(sample.raw[:, :3]).max(axis=1) >= FULL_SCALE
-    accel_full = np.abs(sample.raw[:, 3:6]).max(axis=1) >= FULL_SCALE
+    gyro_full = np.abs(raw[:, :3]).max(axis=1) >= FULL_SCALE
+    accel_full = np.abs(raw[:, 3:6]).max(axis=1) >= FULL_SCALE
     rows = packet("imu").rows(len(at))
     rows["seq"] = count & 0xFF
     rows["flags"] = (
@@ -112,7 +137,7 @@ def _rows(sample: Imu, at: Array, age_s: Array, own_clock: float) -> NDArray[np.
     age_step_s = packet("imu").scale("age") * 1e-6
     rows["age"] = np.round(age_s * own_clock / age_step_s).astype(np.int64)
     for column, name in enumerate(RAW):
-        rows[name] = sample.raw[:, column]
+        rows[name] = raw[:, column]
     rows["aux"] = np.clip(aux, -32768, 32767)
     return rows
 
@@ -154,7 +179,8 @@ def _fail(
     return sent
 
 
-def _transfer(start: int, data: bytes) -> ImuPacket:
+def transfer(start: int, data: bytes) -> ImuPacket:
+    """Return the packet that begins at a tick."""
     transfer_s = (len(data) + 1) * BYTE_S
     return ImuPacket(start, start + round(transfer_s * TICKS_PER_S), packet("imu").address, data)
 

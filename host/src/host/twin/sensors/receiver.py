@@ -28,16 +28,8 @@ def edges(record: FlightRecord) -> NDArray[np.void]:
         ``at`` in Mega ticks, ``levels`` of the five lines behind it: bit 0 aileron, elevator,
         rudder, throttle, switch.
     """
-    widths_s = record.pulses_us * 1e-6
-    starts = record.pulse_starts_s[:, None] + np.concatenate(
-        [np.zeros((len(widths_s), 1)), np.cumsum(widths_s[:, :-1] + GAP_US * 1e-6, axis=1)], axis=1
-    )
-    count = widths_s.shape[1]
-    out = np.zeros(2 * widths_s.size, dtype=EDGE)
-    out["at"][0::2] = ticks(record, starts.ravel())
-    out["at"][1::2] = ticks(record, (starts + widths_s).ravel())
-    out["levels"][0::2] = np.tile(1 << np.arange(count), len(widths_s))
-    keep = np.ones((len(widths_s), count), dtype=bool)
+    out = frame_edges(record, slice(None))
+    keep = np.ones(record.pulses_us.shape, dtype=bool)
     for fault in record.card.faults:
         inside = fault.inside(record.pulse_starts_s)
         if fault.kind == "receiver_lost":
@@ -54,6 +46,19 @@ def edges(record: FlightRecord) -> NDArray[np.void]:
             flips = np.arange(fault.at_s, min(fault.end_s, float(record.t_s[-1])), half_s)
             flips = flips[: len(flips) // 2 * 2]
             out = _merged(out, ticks(record, flips[0::2]), ticks(record, flips[1::2]), fault.place)
+    return out
+
+
+def frame_edges(record: FlightRecord, frames: slice) -> NDArray[np.void]:
+    """Return the edges of some frames of a receiver without a fault, as `edges`."""
+    widths_s = record.pulses_us[frames] * 1e-6
+    starts = record.pulse_starts_s[frames, None] + np.concatenate(
+        [np.zeros((len(widths_s), 1)), np.cumsum(widths_s[:, :-1] + GAP_US * 1e-6, axis=1)], axis=1
+    )
+    out = np.zeros(2 * widths_s.size, dtype=EDGE)
+    out["at"][0::2] = ticks(record, starts.ravel())
+    out["at"][1::2] = ticks(record, (starts + widths_s).ravel())
+    out["levels"][0::2] = np.tile(1 << np.arange(widths_s.shape[1]), len(widths_s))
     return out
 
 

@@ -13,6 +13,7 @@ from host.constants import GRAVITY_MPS2
 from host.twin.testcard.cards import Card, CardError, Segment, length_s
 
 GROUND_S = 17.0  # the logger makes sure of the ground; sticks stirred, enabling sign, idle
+TILTS_S = 10.0  # tilted behind them, where the card holds axes
 # At Mega for half a second, at armed for 0.3 s; both with room for the receiver's frames.
 AT_MEGA_S, AT_ARMED_S = 0.9, 0.32
 SWITCH_S = AT_MEGA_S + AT_ARMED_S
@@ -69,7 +70,9 @@ class _Legs:
         return self.speed_mps + self.way * self.wind_mps
 
 
-def flown_by_logger(card: Card, airspeed_mps: float, distance_m: float) -> Card:
+def flown_by_logger(
+    card: Card, airspeed_mps: float, distance_m: float, *, holds: bool = False
+) -> Card:
     """Return the card with a climb, time for the switch, and turns that keep near home.
 
     Parameters
@@ -79,6 +82,8 @@ def flown_by_logger(card: Card, airspeed_mps: float, distance_m: float) -> Card:
         Wanted where the card does not say.
     distance_m : float
         Largest distance from home at which the logger starts an input; 0 for no limit.
+    holds : bool
+        It holds axes, so the pilot shows it their sense on the ground.
 
     Returns
     -------
@@ -116,6 +121,6 @@ def flown_by_logger(card: Card, airspeed_mps: float, distance_m: float) -> Card:
             needed_s -= PREPARE_S
         legs.fly(s, needed_s)
     climb_m = min(CLIMB_M, 0.9 * card.flight.height_m)
-    ground_s = max(card.flight.ground_s, GROUND_S)
+    ground_s = max(card.flight.ground_s, GROUND_S + (TILTS_S if holds else 0.0))
     flight = replace(card.flight, ground_s=ground_s, climb_m=climb_m)
     return replace(card, segments=tuple(legs.segments), flight=flight)
