@@ -47,14 +47,18 @@ class Case:
 
     def answer(self) -> Record:
         """Identify, and return what is compared; a refusal is an answer too."""
+        return self.identified_and_recorded()[0]
+
+    def identified_and_recorded(self) -> tuple[Record, host.Identification | None]:
+        """Identify, and return what is compared and the answer itself, if it is no refusal."""
         with tempfile.TemporaryDirectory() as place:
             folder = Path(place)
             truth = opened(self.truth, folder) if self.truth else None
             try:
                 found = self.identified(folder)
             except HostError as error:
-                return refusal(error, folder)
-            return record_of(found, folder, truth if isinstance(truth, Path) else None)
+                return refusal(error, folder), None
+            return record_of(found, folder, truth if isinstance(truth, Path) else None), found
 
     def identified(self, folder: Path) -> host.Identification:
         """Identify from inputs that are unpacked into a folder.

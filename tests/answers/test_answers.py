@@ -2,6 +2,7 @@
 
 import pytest
 
+import host
 from tests.answers.answer_record import Record
 from tests.answers.case import Case
 from tests.answers.cases import CASES
@@ -16,10 +17,26 @@ MOST_BYTES = 10_000_000
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_the_answer_is_the_frozen_one(case: Case, request: pytest.FixtureRequest) -> None:
     tolerance = request.config.getoption("--tolerance")
-    old, new = frozen(case.name), case.answer()
+    old, (new, answer) = frozen(case.name), case.identified_and_recorded()
     assert old is not None, f"freeze it: python -m tests.answers {case.name} --update"
     found = [*moved(old, new, tolerance), *fewer_hold(old, new, tolerance)]
     assert not found, "\n".join(found)
+    if answer is not None:
+        it_is_25_lines_of_80_columns(answer)
+
+
+def it_is_25_lines_of_80_columns(found: host.Identification) -> None:
+    """What is printed at first; each further finding or flight is one more line."""
+    lines = found.to_text(full=False).split("\n")
+    said = len({f.text for f in found.findings})
+    assert len(lines) <= 25 + said + len(found.flights) - 1
+    assert max(map(len, lines)) <= 80
+    assert lines[0].startswith("Known from this flight")
+    for head in ("Not known", "Fly next:", "Measure:"):
+        assert sum(line.startswith(head) for line in lines) == 1, head
+    shown = {line.split()[0] for line in lines}
+    assert not found.findings or "Finding:" in shown
+    assert not found.notes or "Note:" in shown
 
 
 def test_stored_inputs_are_those_that_cases_read_and_few_bytes() -> None:

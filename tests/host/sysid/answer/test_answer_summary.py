@@ -3,7 +3,6 @@
 import html
 import json
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,7 +15,6 @@ from host.sysid.answer.truth_comparison import true_poles
 from matplotlib.colors import to_rgba
 
 import host
-from tests.answers.cases import CASES
 
 
 @pytest.fixture(scope="module")
@@ -44,35 +42,6 @@ def simulated(A: Any, B: Any, u: Any, dt_s: float) -> Any:
             now = now + dt_s / 50.0 * (A @ now + B @ u[k])
         x[k + 1] = now
     return x
-
-
-# Inputs of every kind, by the names of frozen cases.
-KINDS = (
-    "twin-log-alone",
-    "twin-log-calibrated",
-    "twin-log-coefficients",
-    "twin-two-logs",
-    "px4",
-    "thor75",
-    "stuck",
-    "users-methods",
-)
-
-
-@pytest.mark.parametrize("name", KINDS)
-def test_it_is_25_lines_of_80_columns(name: str, tmp_path: Path) -> None:
-    (case,) = [case for case in CASES if case.name == name]
-    found = case.identified(tmp_path)
-    lines = found.to_text(full=False).split("\n")
-    said = len({f.text for f in found.findings})
-    assert len(lines) <= 25 + said + len(found.flights) - 1
-    assert max(map(len, lines)) <= 80
-    assert lines[0].startswith("Known from this flight")
-    for head in ("Not known", "Fly next:", "Measure:"):
-        assert sum(line.startswith(head) for line in lines) == 1, head
-    shown = {line.split()[0] for line in lines}
-    assert not found.findings or "Finding:" in shown
-    assert not found.notes or "Note:" in shown
 
 
 def test_every_form_has_the_same_view(found: host.Identification) -> None:
