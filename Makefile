@@ -1,6 +1,6 @@
 # Two commands: `make demo` and `make test`. Both set up what they need first.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test native mega sitl lint format bench study judgement tune-bench fleet-bench live-bench flight-bench imu-bench faults power-cuts card-images fuzz mutants hw clean docs release input-flights ideas ground-triggers hold-flights
+.PHONY: help setup demo test campaign native mega sitl lint format bench study judgement tune-bench fleet-bench live-bench flight-bench imu-bench faults power-cuts card-images fuzz mutants hw clean docs release input-flights ideas ground-triggers hold-flights
 PYTHON := .venv/bin/python
 PIO := .venv/bin/pio
 # Runs a module of tests/chip in that folder; what it imports lies elsewhere.
@@ -22,6 +22,9 @@ demo: ## fly a virtual flight through the recorder, identify it, open the report
 
 test: setup ## run every test (STAGES="lint native" runs some)
 	@$(PYTHON) .ci/stages.py $(STAGES)
+
+campaign: setup mega sitl ## cases that repeat those of `make test` on more images, seeds and inputs (before a release)
+	@$(PYTHON) -m pytest -m campaign --numprocesses=2 --dist=loadfile tests
 
 docs: setup sitl ## pages as a searchable site, with the API and the notebooks run: build/docs/site
 	@python3 .ci/docs/site.py

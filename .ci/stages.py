@@ -265,6 +265,8 @@ def main() -> int:
     chosen = [stage for stage in known if not asked.names or stage.name in asked.names]
 
     LOGS.mkdir(parents=True, exist_ok=True)
+    # A shell that forbids it has each of hundreds of short processes compile the host anew.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     start_s = time.monotonic()
     futures: dict[str, Future[Outcome]] = {}
     # A stage waits only for stages before it in the list, so two workers cannot block each other.

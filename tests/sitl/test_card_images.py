@@ -16,7 +16,7 @@ from tests.cards.truth import look_at
 from tests.sitl.card_flight import fly
 from tests.sitl.card_images import Kept, build_sanitized, fly_all
 
-CARDS = 200
+CARDS = 50
 NONE = np.zeros(0, np.int64)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import stack_depth
-from compilers import TESTED
+from both_images import each_image_once
 from devices.ardu_imu import ImuSample, SentSample
 from flight.bench import pulses, signals
 from flight.bench.fly import fly
@@ -22,8 +22,11 @@ FRAME = 20_000 * US
 
 
 @pytest.mark.costs(20, "a row is flown by the image, instruction by instruction")
-@pytest.mark.parametrize("flight_elf", TESTED, indirect=True)
-@pytest.mark.parametrize(("rate_hz", "first"), [(100, 1), (200, 6)])
+@pytest.mark.parametrize(
+    ("flight_elf", "rate_hz", "first"),
+    each_image_once([(100, 1), (200, 6)]),
+    indirect=["flight_elf"],
+)
 def test_short_flight_keeps_every_limit(
     flight_elf: Path, tmp_path: Path, rate_hz: int, first: int
 ) -> None:
@@ -43,10 +46,12 @@ def test_short_flight_keeps_every_limit(
     assert flight.stalls >= 2
 
 
-@pytest.mark.parametrize("flight_elf", TESTED, indirect=True)
 @pytest.mark.parametrize(
-    ("rate_hz", "frame_s", "holds"),
-    [(100, FRAMES_S[1], False), (200, FRAMES_S[0], False), (200, FRAMES_S[1], True)],
+    ("flight_elf", "rate_hz", "frame_s", "holds"),
+    each_image_once(
+        [(100, FRAMES_S[1], False), (200, FRAMES_S[0], False), (200, FRAMES_S[1], True)]
+    ),
+    indirect=["flight_elf"],
 )
 def test_row_that_teaches_or_holds_keeps_every_limit(
     flight_elf: Path, tmp_path: Path, rate_hz: int, frame_s: float, holds: bool

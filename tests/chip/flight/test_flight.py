@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from compilers import TESTED
+from both_images import each_image_once
 from host.link.status_line import parse_status
 from host.wire.framing import text_of
 from image_hash import image_hash
@@ -34,8 +34,9 @@ def test_bare_board_boots_and_says_what_is_missing(flight_elf: Path) -> None:
         assert chip.faults() == []
 
 
-@pytest.mark.parametrize("flight_elf", TESTED, indirect=True)
-@pytest.mark.parametrize("imu_hz", [100.0, 200.0])
+@pytest.mark.parametrize(
+    ("flight_elf", "imu_hz"), each_image_once([(100.0,), (200.0,)]), indirect=["flight_elf"]
+)
 def test_every_sample_is_in_the_log_once(
     make_rig: MakeRig, flight_elf: Path, tmp_path: Path, imu_hz: float
 ) -> None:

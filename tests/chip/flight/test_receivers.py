@@ -22,7 +22,7 @@ FRAMES_AT_REST = 1.5
 FLOWN_S = 0.4
 
 
-@pytest.fixture(scope="module", params=RECEIVERS, ids=lambda kind: kind.name)
+@pytest.fixture(scope="module")
 def in_row(
     request: pytest.FixtureRequest, flight_elf: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[InRow]:
@@ -75,7 +75,22 @@ def known(rig: FlightRig, fault: Callable[[FlightRig], None], begin: int) -> flo
     return next(ends) + 16e6 * ACCEPTED_S
 
 
-@pytest.mark.parametrize("fault", [nothing, stick, throttle, switch, silence])
+FAULTS = (nothing, stick, throttle, switch, silence)
+EVERY_FAULT = (RECEIVERS[0], RECEIVERS[-1])  # the fastest in turn, the slowest all at once
+
+
+@pytest.mark.parametrize(
+    ("in_row", "fault"),
+    [
+        pytest.param(
+            kind, fault, id=f"{kind.name}-{fault.__name__}",
+            marks=() if kind in EVERY_FAULT or fault in (nothing, stick) else pytest.mark.campaign,
+        )
+        for kind in RECEIVERS
+        for fault in FAULTS
+    ],
+    indirect=["in_row"],
+)  # fmt: skip
 def test_a_row_with_each_receiver(in_row: InRow, fault: Callable[[FlightRig], None]) -> None:
     """Whole frames apart, so that a change is not cut in two by one."""
     rig, row = in_row

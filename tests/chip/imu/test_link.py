@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from compilers import TESTED
+from both_images import each_image_once
 from image_hash import image_hash
 
 if TYPE_CHECKING:
@@ -26,16 +26,19 @@ CHOSEN = (
 )
 
 
-@pytest.mark.parametrize(("mega_elf", "imu_elf"), [(v, v) for v in TESTED], indirect=True)
-@pytest.mark.parametrize("over_i2c", [False, True], ids=["mpu6000", "mpu6050"])
+@pytest.mark.parametrize(
+    ("gcc", "over_i2c"), each_image_once([(False,), (True,)]), ids=lambda value: str(value)
+)
 def test_every_sample_is_in_the_log_once_at_its_instant(
-    mega_elf: Path, imu_elf: Path, tmp_path: Path, over_i2c: bool
+    tmp_path: Path, gcc: str, over_i2c: bool
 ) -> None:
+    from flight.images import build_image
     from flight.rig import make_card
     from imu.link import run_link
     from imu.rig import PairRig
 
     card = make_card(tmp_path / "card.img")
+    mega_elf, imu_elf = (build_image(unit, gcc) for unit in ("mega2560", "arduimu"))
     rig = PairRig(mega_elf, imu_elf, card, clock_ppm=3000.0, mpu_ppm=-8000.0, over_i2c=over_i2c)
     link = run_link(rig, 6.0, tmp_path)
     said = rig.board.chip.uart_sent(0)
