@@ -21,7 +21,7 @@ def test_genetic_search_finds_the_valley_from_far_away() -> None:
             for p, t in zip(far.parameters, TRUTH, strict=True)
         ),
     )
-    result = fit("genetic", bounded, [noisy(14)], generations=60)
+    result = fit("genetic", bounded, [noisy(14)], generations=30)
     reference = fit("output-error", navion_structured(), [noisy(14)])
     miss = np.abs(result.estimate - reference.estimate) / reference.standard_error
     assert np.max(miss) < 0.05
