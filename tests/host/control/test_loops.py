@@ -9,13 +9,13 @@ import control
 import numpy as np
 import pytest
 from host.arrays import Array
-from host.control import ControlError, release_in, release_note
+from host.control import ControlError, release_in
 from host.control.autopilots import ardupilot, inav, mega, px4
 from host.control.autopilots.known import AUTOPILOTS
 from host.control.autopilots.structure import state_space
 from host.control.margins import FAR_DB, margins
 from host.control.plant import continuous, sampled
-from host.control.releases import called
+from host.control.releases import called, release_note
 from host.control.scenarios import law_response
 
 

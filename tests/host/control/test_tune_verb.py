@@ -61,9 +61,17 @@ def test_a_log_of_another_autopilot_gives_neither(
     assert "is a log of ardupilot, gains are for px4" in capsys.readouterr().err
 
 
-def test_a_release_of_another_law_is_refused_before_the_flight_is_identified(
-    asked: dict[str, Any], capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--release", "4.0"], "before 4.1 another law flies"),
+        (["--airspeed", "-3"], "airspeed -3 m/s, expected a positive number"),
+        (["--for", "betaflight"], "autopilot 'betaflight', expected ardupilot, px4, inav, mega"),
+    ],
+)
+def test_what_no_flight_answers_is_refused_before_it_is_identified(
+    asked: dict[str, Any], capsys: pytest.CaptureFixture[str], words: list[str], said: str
 ) -> None:
-    assert tune("--release", "4.0") == 2
+    assert tune(*words) == 2
     assert not asked
-    assert "before 4.1 another law flies" in capsys.readouterr().err
+    assert said in capsys.readouterr().err

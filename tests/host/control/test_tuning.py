@@ -26,7 +26,7 @@ from host.control.loop_design import Design, design, feed_forward, search
 from host.control.outer_loops import OuterCheck
 from host.control.parameter_file import Change, taken_back
 from host.control.scenarios import Problem, draw, scenarios_of
-from host.control.tuning import Tuning
+from host.control.tuning import Tuning, unchecked
 from host.control.tuning_notes import tuning_notes
 from host.control.uncertain_axis import UncertainAxis
 from host.control.verification import Required, control_margins, verify
@@ -231,6 +231,11 @@ def test_defaults_are_told_by_the_names_of_the_release() -> None:
     older, newer = (" ".join(tuning_notes(found, chosen, {}, (), r)) for r in ("4.4", "4.5"))
     assert "ARSPD_FBW_MIN, ARSPD_FBW_MAX" in older
     assert "AIRSPEED_MIN, AIRSPEED_MAX" in newer
+    # A model of roll alone has no path; where there are no gains there is nothing around them.
+    said = "path (L1) is not checked: the model 'roll' lacks its motion"
+    assert list(unchecked(chosen, found)) == [said]
+    none = [replace(found[0], design=replace(found[0].design, gains=None))]
+    assert not list(unchecked(chosen, none))
 
 
 def test_what_is_around_inavs_gains_is_said_to_be_unchecked() -> None:

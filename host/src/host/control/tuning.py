@@ -14,6 +14,7 @@ import numpy as np
 
 from host.aircraft.file import load_measured
 from host.control.actuator import Actuator, actuator_of
+from host.control.asked import check_asked
 from host.control.autopilots.known import AUTOPILOTS, Autopilot, Rudder
 from host.control.axis_tuning import AxisTuning, YawTuning, changes_of
 from host.control.bandwidth_costs import bandwidth_costs
@@ -230,8 +231,7 @@ def tune(
     host.errors.HostError
         A file cannot be read.
     """
-    if autopilot not in AUTOPILOTS:
-        raise ControlError(f"autopilot '{autopilot}', expected {', '.join(AUTOPILOTS)}")
+    check_asked(autopilot, release, airspeeds_mps)
     chosen = AUTOPILOTS[autopilot]
     newer = release_note(autopilot, release) if release else ""
     if isinstance(source, Sequence):
@@ -242,9 +242,6 @@ def tune(
     else:
         axes, dated = axes_of(source), date.today()
         noise = {name: _noise(source, name) for name in axes}
-    wrong = [f"{v:g}" for v in airspeeds_mps if not 0.0 < v < np.inf]
-    if wrong:
-        raise ControlError(f"airspeed {', '.join(wrong)} m/s, expected a positive number")
     loaded = load_measured(aircraft)
     logged = dict(parameters or {})
     found = []
@@ -270,6 +267,7 @@ def tune(
         found, yaw = with_rudder(chosen, aircraft, found, seed)
     except ControlError as error:
         notes.append(f"no yaw damper: {error}")
+    notes += unchecked(chosen, found)
     found = [_explained(one) for one in found]
     outer = tuple(_around(chosen, found, logged, seed))
     return Tuning(
@@ -292,9 +290,22 @@ def _around(
     """Yield what the loops around do on aircraft of a drawing of their own."""
     for outer in chosen.outer(logged) if chosen.outer else ():
         for one in axes:
-            whole = one.problem.axis.template in ("lateral", "longitudinal")
-            if one.axis == outer.axis and one.design.gains and whole:
+            if one.axis == outer.axis and one.design.gains and _is_whole(one):
                 yield check(outer, one.problem, one.design.gains, 1000 * seed + 900)
+
+
+def _is_whole(one: AxisTuning) -> bool:
+    """Return whether the model of an axis has the motion of path and height too."""
+    return one.problem.axis.template in ("lateral", "longitudinal")
+
+
+def unchecked(chosen: Autopilot, axes: Sequence[AxisTuning]) -> Iterator[str]:
+    """Yield a sentence for each loop around gains that their model cannot tell of."""
+    for outer in chosen.outer({}) if chosen.outer else ():
+        for one in axes:
+            if one.axis == outer.axis and one.design.gains and not _is_whole(one):
+                template = one.problem.axis.template
+                yield f"{outer.title} is not checked: the model '{template}' lacks its motion"
 
 
 def with_rudder(

@@ -50,11 +50,10 @@ def run(args: argparse.Namespace) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.aircraft.origin import announce_aircraft
     from host.control import (
-        AUTOPILOTS,
         ControlError,
+        check_asked,
         read_parameters,
         release_in,
-        release_note,
         tune,
     )
     from host.errors import ExitCode
@@ -64,8 +63,7 @@ def run(args: argparse.Namespace) -> int:
     from host.sysid.pipeline import identify
 
     # Before minutes of work.
-    if args.autopilot not in AUTOPILOTS:
-        raise ControlError(f"--for {args.autopilot}, expected {', '.join(AUTOPILOTS)}")
+    check_asked(args.autopilot, args.release, args.airspeed)
     if args.save is not None:
         check_destination("--save", args.save, folder=False)
     if args.plots is not None:
@@ -87,8 +85,7 @@ def run(args: argparse.Namespace) -> int:
                 " its parameters are left out; name the others with --parameters",
                 file=sys.stderr,
             )
-    if release:
-        release_note(args.autopilot, release)
+    check_asked(args.autopilot, release, args.airspeed)
     source: Any = models or identify(args.source, aircraft=args.aircraft)
     found = tune(
         source,
