@@ -40,7 +40,7 @@ from host.aircraft.airframe import (
 from host.aircraft.attitude import quaternion
 from host.aircraft.file import load
 from host.aircraft.rigid_body import step
-from host.aircraft.trim import solve
+from host.aircraft.trim import Trim, solve
 from host.compiled import compiled_fast
 from host.twin.flight.stick_commands import THROW_US
 from host.twin.recorder.sitl_library import TICKS_PER_S
@@ -210,10 +210,7 @@ def fly_closed(
     bench.sitl.power_on()
     bench.sitl.run_until(round((LAUNCH_S - 0.003) * TICKS_PER_S))
 
-    field_air: Atmosphere = atmosphere(101_325.0, 15.0)
-    density = density_kgpm3(field_air, HEIGHT_M)
-    nominal = load("ultrastick25e").airframe()
-    trim = solve(nominal, AIRSPEED_MPS, density_kgpm3=density)
+    density, trim = _trimmed()
     gusts = turbulence(Air(turbulence_mps=world.turbulence_mps), HEIGHT_M)
     random = np.random.default_rng([world.seed, 7])
     x, z, now = trim.state.copy(), np.zeros(GUST_STATES), np.zeros(9)
@@ -230,10 +227,10 @@ def fly_closed(
         at_s = LAUNCH_S + n * PACKET_S
         start, output, width = (each[-SEEN_PULSES:] for each in bench.sitl.pulses())
         ended = start + width <= bench.sitl.now()
+        newest = dict(zip(output[ended].tolist(), width[ended].tolist(), strict=True))
         for axis, surface in ((0, 1), (1, 0), (2, 2)):
-            mine = np.flatnonzero(ended & (output == axis))
-            if mine.size:
-                us = 0.5 * float(width[mine[-1]]) - NEUTRAL_US
+            if axis in newest:
+                us = 0.5 * newest[axis] - NEUTRAL_US
                 command[surface] = trim.command[surface] + world.offset_rad[axis]
                 command[surface] += per_us[axis] * us
         noise = random.standard_normal((5, 4))
@@ -258,6 +255,14 @@ def fly_closed(
             waiting.pop(0)[1](bench)
     table = np.array(rows)
     return Motion(table[:, 0], table[:, 1], table[:, 2], table[:, 3:6])
+
+
+@cache
+def _trimmed() -> tuple[float, Trim]:
+    field_air: Atmosphere = atmosphere(101_325.0, 15.0)
+    density = density_kgpm3(field_air, HEIGHT_M)
+    nominal = load("ultrastick25e").airframe()
+    return density, solve(nominal, AIRSPEED_MPS, density_kgpm3=density)
 
 
 @cache

@@ -215,17 +215,17 @@ class Sitl:
         `byte_us` is the time of a byte with its acknowledge: 22.5 at 400 kHz, 90 at 100 kHz.
         """
         when = _ticks(start)
-        data = np.zeros((len(packets), PACKET_BYTES), dtype=np.uint8)
-        for row, packet in zip(data, packets, strict=True):
-            row[: len(packet)] = np.frombuffer(packet, dtype=np.uint8)
-        lengths = _bytes([len(packet) for packet in packets])
-        addresses = _bytes(np.broadcast_to(np.asarray(address), len(packets)))
-        _in_order(when, lengths)
+        # Bytes, not arrays: a loop with an aircraft adds one packet at a time.
+        data = b"".join(packet.ljust(PACKET_BYTES, b"\0") for packet in packets)
+        if len(data) != len(packets) * PACKET_BYTES:
+            raise ValueError(f"a packet has at most {PACKET_BYTES} bytes")
+        addresses = bytes([address] * len(packets) if isinstance(address, int) else address)
+        _in_order(when, len(packets))
         self._c.sitl_add_packets(
             _of(when),
-            _of(addresses),
-            _of(lengths),
-            _of(data),
+            addresses,
+            bytes([len(packet) for packet in packets]),
+            data,
             ctypes.c_uint32(round(byte_us * TICKS_PER_US)),
             ctypes.c_size_t(len(when)),
         )
@@ -354,7 +354,7 @@ class Sitl:
 
     def _add(self, function: str, at: npt.ArrayLike, values: npt.ArrayLike) -> None:
         when, data = _ticks(at), _bytes(values)
-        _in_order(when, data)
+        _in_order(when, data.size)
         getattr(self._c, function)(_of(when), _of(data), ctypes.c_size_t(len(when)))
 
 
@@ -366,10 +366,10 @@ def _bytes(values: npt.ArrayLike) -> NDArray[np.uint8]:
     return np.ascontiguousarray(values, dtype=np.uint8)
 
 
-def _in_order(when: Ticks, values: NDArray[np.uint8]) -> None:
-    if when.shape != values.shape or when.ndim != 1:
-        raise ValueError(f"found arrays of {when.shape} and {values.shape}, they must be alike")
-    if np.any(np.diff(when) < 0):
+def _in_order(when: Ticks, count: int) -> None:
+    if when.shape != (count,):
+        raise ValueError(f"found times of {when.shape} for {count} values, they must be alike")
+    if count > 1 and np.any(np.diff(when) < 0):
         raise ValueError("times must not go back")
 
 
