@@ -225,6 +225,16 @@ def test_files_of_ground_stations_have_their_own_lines() -> None:
     ]
 
 
+def test_an_aircraft_that_the_least_gains_leave_unstable_has_gains_too() -> None:
+    # s^2 - s + 150 (P + D s): by hand only D above 1/150 holds it, and the least D is none.
+    axis = replace(rolling(0.1), mean=np.array([1.0, 150.0]))
+    known = replace(problem(0.1, autopilot="mega"), axis=axis)
+    found = design(known, seed=1)
+    assert found.gains is not None
+    assert found.gains["D"] > 1.0 / 150.0
+    assert found.verification.holds
+
+
 def test_defaults_are_told_by_the_names_of_the_release() -> None:
     found = [AxisTuning(problem(0.1), design(problem(0.1), seed=1), {})]
     chosen = AUTOPILOTS["ardupilot"]

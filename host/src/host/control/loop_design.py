@@ -112,17 +112,22 @@ def softest(problem: Problem) -> dict[str, float]:
 
 
 def _reach(problem: Problem, seen: Scenarios, role: str) -> int:
-    """Return the steps of a parameter above its least until a loop of the drawn is unstable.
+    """Return the steps of a parameter above its least until a loop of the drawn turns unstable.
 
     The documented range ends it where it comes first; PX4's reach to a hundred times what flies.
+    Aircraft that the least gains leave unstable, as a spiral is, say nothing of too large ones.
     """
     setting, least = problem.structure.settings[role], _least(problem, role)
     last = round((setting.highest - least) / setting.step)
     own = {one: _least(problem, one) for one in problem.structure.searched}
-    steps = 1
-    while steps < last:
+
+    def stable(steps: int) -> Array:
         gains = {**own, role: least + steps * setting.step}
-        if not seen.stable(problem.structure.completed(gains, feed_forward(problem))).all():
+        return seen.stable(problem.structure.completed(gains, feed_forward(problem)))
+
+    before, steps = stable(0), 1
+    while steps < last:
+        if np.any(before > stable(steps)):
             return steps
         steps *= 2
     return last
