@@ -79,10 +79,6 @@ def _bare(model: Any, _: float, start: Any) -> Any:
     return model, start
 
 
-def _as_it_was(problem: Any, _: Any, found: Any, __: Any) -> Any:
-    return found, np.zeros((len(problem.maneuvers), len(found.theta)))
-
-
 def _full(lengths: Any, *_: Any, **__: Any) -> Any:
     return 1.0, 1.0
 
@@ -320,12 +316,6 @@ SWITCHES = (
         "takes output error where a gust filter finds none",
         "estimators.filter_error_gust:_unfit_in_calm",
         gives(""),
-    ),
-    _one(
-        "restricted likelihood",
-        "takes one step for the constants' share of the noise",
-        "estimators.filter_error:_restricted",
-        _as_it_was,
     ),
     _one(
         "what passes for a delay",

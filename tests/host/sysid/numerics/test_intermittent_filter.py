@@ -8,7 +8,6 @@ from host.arrays import BoolArray
 from host.sysid.models import LinearModel, Maneuver, Parameter, Term
 from host.sysid.numerics import FilterProblem, InnovationLikelihood
 from host.sysid.numerics.process_noise import discrete_noise
-from host.sysid.numerics.restricted_likelihood import restricted_slopes
 from scipy import stats
 
 DT_S, SAMPLES = 0.05, 40
@@ -183,25 +182,3 @@ def test_information_is_the_covariance_of_the_score() -> None:
     mean = np.mean(told, axis=0)
     ratio = np.var(scores, axis=0) / np.diag(mean)
     np.testing.assert_allclose(ratio, 1.0, atol=5.0 * np.sqrt(2.0 / draws))
-
-
-@pytest.mark.parametrize("kind", ["each fifth", "at random", "all"])
-def test_constants_are_integrated_out_of_what_was_measured(kind: str) -> None:
-    """Half the slopes of ln det X' S^-1 X by the dense covariance S, X what constants do."""
-    problem, theta = problem_of(kind)
-    found = restricted_slopes(problem, theta, np.full(len(theta), 1e-3))[0]
-    one = np.eye(len(theta))
-    mean, _ = dense_moments(problem, theta)
-    constants = problem.output_problem.columns(0)[problem.output_problem.n_common :]
-    X = np.array([dense_moments(problem, theta + one[k])[0] - mean for k in constants]).T
-
-    def half_log_determinant(moved: np.ndarray) -> float:
-        return float(0.5 * np.linalg.slogdet(X.T @ np.linalg.solve(spread(moved), X))[1])
-
-    def spread(moved: np.ndarray) -> np.ndarray:
-        return dense_moments(problem, moved)[1]
-
-    for k, name in enumerate(problem.names):
-        up, down = (half_log_determinant(theta + h * one[k]) for h in (1e-4, -1e-4))
-        assert found[k] == pytest.approx((up - down) / 2e-4, rel=2e-3, abs=1e-4), name
-    assert np.all(np.abs(found[[1, 2]]) > 0.01)

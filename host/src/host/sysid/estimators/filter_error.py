@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -21,7 +20,6 @@ from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.gauss_newton import (
     STEP_LIMIT,
     GaussNewtonResult,
-    damped_step,
     gauss_newton,
 )
 from host.sysid.numerics.information_inverse import covariance_from_information
@@ -29,7 +27,6 @@ from host.sysid.numerics.innovation_problem import InnovationLikelihood, Innovat
 from host.sysid.numerics.maneuver_agreement import maneuver_influence
 from host.sysid.numerics.model_problems import innovation_problem, needs_compiler
 from host.sysid.numerics.output_error import minimise
-from host.sysid.numerics.restricted_likelihood import restricted_slopes
 
 MAX_ITERATIONS = 60
 NEAR_BOUNDS = 0.2  # Cramer-Rao bounds: a search that still creeps by so little has ended
@@ -45,7 +42,6 @@ def fit_filter_error(
     roughly: bool = False,
     compare_noise: bool = True,
     hac: bool = False,
-    restricted: bool = False,
 ) -> FitResult:
     """Fit by filter error.
 
@@ -70,10 +66,6 @@ def fit_filter_error(
         Ask whether coloured measurement noise explains the data better (`compare_noise_models`).
     hac : bool
         Inflate standard errors by the autocorrelation of the scores (`hac_inflation`).
-    restricted : bool
-        Take one step on to the optimum of the restricted likelihood (`restricted_likelihood`):
-        what the constants of short maneuvers take of slow noise biases nothing then. Equations
-        have none.
 
     Raises
     ------
@@ -93,9 +85,6 @@ def fit_filter_error(
     if found is None:
         raise IdentificationError(f"model {model.name}: the Kalman filter fails at the start")
     covariance = covariance_from_information(found.information)
-    slopes: Array = np.zeros((len(maneuvers), len(theta)))
-    if restricted and isinstance(problem, FilterProblem):
-        found, slopes = _restricted(problem, objective, found, covariance)
     theta, point, n_model = found.theta, found.trial, problem.n_model
     factor = _inflation(problem, found, covariance) if hac else np.ones(len(theta))
     creeps = f"no convergence: last step {found.step:.3g} bounds long"
@@ -123,7 +112,7 @@ def fit_filter_error(
             "hac_inflation": factor,
             "process_deviation": np.exp(theta[n_model:n_noise]),
             "noise_deviation": np.exp(theta[n_noise:]),
-            **maneuver_influence(objective.parts, list(objective.scores - slopes), covariance),
+            **maneuver_influence(objective.parts, objective.scores, covariance),
         },
     )
     return compare_noise_models(result, maneuvers, first) if compare_noise else result
@@ -176,29 +165,6 @@ def information_at(
     if point is None:
         raise IdentificationError(f"model {model.name}: the Kalman filter fails at these values")
     return problem.total(theta, *problem.scoring(theta, point))[0]
-
-
-def _restricted(
-    problem: FilterProblem,
-    objective: InnovationObjective,
-    found: GaussNewtonResult[InnovationLikelihood],
-    covariance: Array,
-) -> tuple[GaussNewtonResult[InnovationLikelihood], Array]:
-    """Return the search one step on, and what the constants add to the slopes of each maneuver.
-
-    One step does: three more moved L_p by 0.3 % where air rolls. As it was where none is better.
-    """
-    bounds = np.where(found.free, np.sqrt(np.diag(covariance)), 0.0)
-    slopes = restricted_slopes(problem, found.theta, bounds)
-    step, _ = damped_step(found.information, -slopes.sum(axis=0), found.free, 0.0)
-    theta = objective.apply_step(found.theta, step)
-    trial = objective.evaluate(theta)
-    if trial is None:
-        return found, np.zeros_like(slopes)
-    gain = -float(slopes.sum(axis=0) @ (theta - found.theta))
-    if not gain > trial.cost - found.trial.cost:
-        return found, np.zeros_like(slopes)
-    return replace(found, theta=theta, trial=trial), slopes
 
 
 def _driven(model: LinearModel) -> tuple[str, ...]:

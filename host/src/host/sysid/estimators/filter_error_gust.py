@@ -180,7 +180,6 @@ def fit_gust_state(
             noise=noise,
             roughly=roughly,
             compare_noise=False,
-            restricted=not roughly,
         )
         failure = "" if near_its_optimum(result) else result.warnings[0]
     except IdentificationError as error:
