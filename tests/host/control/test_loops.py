@@ -224,6 +224,7 @@ def test_names_of_older_releases_are_read_too() -> None:
         ("PX4 release/1.14 PX4_FMU_V6X", "1.14"),
         ("PX4 v1.15 SIMULATED", "1.15"),
         ("PX4 main PX4_FMU_V5", ""),
+        ("PX4 fix-1.2-roll PX4_FMU_V5", ""),
     ],
 )
 def test_a_log_names_its_release(firmware: str, release: str) -> None:

@@ -27,9 +27,9 @@ def release_of(text: str) -> Release:
 def release_in(firmware: str) -> str:
     """Return the release that a log's line names: ``4.5`` of ``ArduPlane V4.5.7 (0a1b2c3d)``.
 
-    Empty where it names none, as a branch does.
+    Empty where it names none; a number in the name of somebody's branch is no release.
     """
-    found = re.search(r"(?<![\w.])[vV]?(\d+\.\d+)", firmware)
+    found = re.search(r"(?:(?<![\w.])[vV]|release/)(\d+\.\d+)", firmware)
     return found[1] if found else ""
 
 
