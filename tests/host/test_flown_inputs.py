@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -112,6 +113,23 @@ def test_an_input_too_small_to_be_found_is_told_beside_one_of_the_pilots() -> No
         ("elevator_rad", "multisine"), ("aileron_rad", "pulse"),
     ]  # fmt: skip
     assert (told[0].start_s, told[0].input_end_s, told[0].end_s) == (5.0, 9.0, 12.0)
+
+
+def test_what_a_row_holds_in_its_quiet_time_is_feedback_and_no_input() -> None:
+    t_s = np.arange(0.0, 30.0, 0.01)
+
+    def pulse(start_s: float, size: float) -> Array:
+        return np.where((t_s >= start_s) & (t_s < start_s + 0.5), size, 0.0)
+
+    # The pilot's pulse, then wings brought level at the trigger, then the row.
+    columns = {"t_s": t_s, "elevator_rad": pulse(15.0, 0.06), "rudder_rad": 0.0 * t_s,
+               "aileron_rad": pulse(5.0, 0.06) + pulse(12.2, 0.05)}  # fmt: skip
+    row = FlownInput(0, 15.0, 15.5, "pulse", "done", (0.0, 20.0, 0.0), (), 12.0)
+    told = detect_maneuvers(columns | input_columns(t_s, [row]))
+    assert [m.axis[:4] for m in told] == ["aile", "aile", "elev"]
+    told = detect_maneuvers(columns | input_columns(t_s, [replace(row, held=("aileron",))]))
+    assert [m.axis[:4] for m in told] == ["aile", "elev"]
+    assert told[0].start_s < 6.0
 
 
 def test_a_lost_row_is_given_to_the_surfaces_that_moved() -> None:

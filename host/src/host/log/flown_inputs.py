@@ -36,6 +36,8 @@ class FlownInput:
         Aileron, elevator, rudder; zeros where the log lost the row.
     held : tuple of str
         Surfaces that the logger moved to hold bank and pitch: they are feedback, not input.
+    triggered_s : float
+        When the row began: it holds from there on, its quiet time included.
     """
 
     row: int
@@ -45,6 +47,7 @@ class FlownInput:
     reason: str
     amplitude_us: tuple[float, ...]
     held: tuple[str, ...] = ()
+    triggered_s: float = 0.0
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -87,11 +90,12 @@ def inputs_of_session(session: Session) -> list[FlownInput]:
             last_us = first_us + 1000.0 * known["duration_ms"]
         if last_us is None or last_us <= first_us:
             return
-        start_s, end_s = session.seconds(np.array([first_us, last_us])).tolist()
+        times_us = np.array([at_us, first_us, last_us])
+        triggered_s, start_s, end_s = session.seconds(times_us).tolist()
         sizes = tuple(map(float, known["amplitude_us"])) if known else (0.0, 0.0, 0.0)
         shape = shapes.get(known["shape"], UNKNOWN) if known else UNKNOWN
         held = held_axes(known) if known else ()
-        found.append(FlownInput(row, start_s, end_s, shape, reason, sizes, held))
+        found.append(FlownInput(row, start_s, end_s, shape, reason, sizes, held, triggered_s))
 
     for event, at_us in zip(events, t_us.tolist(), strict=True):
         code, arg = int(event["code"]), int(event["arg"])

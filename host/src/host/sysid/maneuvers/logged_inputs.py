@@ -14,9 +14,11 @@ from host.arrays import Array
 
 if TYPE_CHECKING:
     from host.log.flown_inputs import FlownInput
+    from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 
 # On the rows while an input runs; 0 elsewhere: no input starts with its log.
 START, END, SHAPE, AXES = "input_start_s", "input_end_s", "input_shape", "input_axes"
+TRIGGER, HELD = "input_trigger_s", "input_held"
 SURFACES = ("aileron", "elevator", "rudder")
 KINDS = ("multistep", "pulse", "doublet", "3-2-1-1", "sweep", "multisine")  # by card_shape
 SHAPES = ("unknown", "pulse", "doublet", "three_two_one_one", "sweep", "multisine")
@@ -33,13 +35,18 @@ def input_columns(t_s: Array, inputs: Sequence[FlownInput]) -> dict[str, Array]:
     """
     if not inputs:
         return {}
-    columns: dict[str, Array] = {name: np.zeros(len(t_s)) for name in (START, END, SHAPE, AXES)}
+    names = (START, END, SHAPE, AXES, TRIGGER, HELD)
+    columns: dict[str, Array] = {name: np.zeros(len(t_s)) for name in names}
     for one in inputs:
         first, last = np.searchsorted(t_s, (one.start_s, one.end_s))
         rows = slice(int(first), max(int(last), int(first) + 1))
-        bits = sum(1 << k for k, name in enumerate(SURFACES) if name in one.axes)
+        moved, held = (
+            sum(1 << k for k, name in enumerate(SURFACES) if name in among)
+            for among in (one.axes, one.held)
+        )
         shape = SHAPES.index(one.shape) if one.shape in SHAPES else 0
-        for name, value in ((START, one.start_s), (END, one.end_s), (SHAPE, shape), (AXES, bits)):
+        values = (one.start_s, one.end_s, shape, moved, one.triggered_s, held)
+        for name, value in zip(names, values, strict=True):
             columns[name][rows] = value
     return columns
 
@@ -77,3 +84,30 @@ def logged_inputs(
         for name in moved:
             found[name, start_s, end_s] = (KINDS[int(shape)], swings[name])
     return found
+
+
+def without_held(
+    columns: Mapping[str, Array], found: Sequence[DetectedManeuver]
+) -> list[DetectedManeuver]:
+    """Return what no row held: from its trigger on a held surface moves by feedback.
+
+    Parameters
+    ----------
+    columns : mapping
+        With those of `input_columns`.
+    found : sequence of DetectedManeuver
+    """
+    ends = np.asarray(columns[END])
+    spans: set[tuple[str, float, float]] = set()
+    for end_s in np.unique(ends[ends > 0.0]).tolist():
+        first = int(np.argmax(ends == end_s))
+        bits, begin_s = int(columns[HELD][first]), float(columns[TRIGGER][first])
+        spans |= {(f"{s}_rad", begin_s, end_s) for k, s in enumerate(SURFACES) if bits >> k & 1}
+    return [
+        item
+        for item in found
+        if not any(
+            item.axis == axis and item.start_s < end_s and item.input_end_s > begin_s
+            for axis, begin_s, end_s in spans
+        )
+    ]

@@ -16,7 +16,7 @@ import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
 from host.sysid.maneuvers.free_response import with_free_response
-from host.sysid.maneuvers.logged_inputs import logged_inputs
+from host.sysid.maneuvers.logged_inputs import logged_inputs, without_held
 from host.sysid.maneuvers.overlapping_inputs import SUSTAINED, bounded, without_echoes
 from host.sysid.maneuvers.sustained_inputs import sustained_inputs
 
@@ -133,7 +133,7 @@ def _of_record(columns: Mapping[str, Array], flying: BoolArray) -> list[Detected
     found = bounded(without_echoes(found, {**columns, **surfaces, "t_s": t}), float(t[-1]))
     logged = logged_inputs(columns, surfaces)
     if logged:
-        found = _with_logged_windows(logged, found, float(t[-1]))
+        found = _with_logged_windows(logged, without_held(columns, found), float(t[-1]))
     if "bridged" in columns:
         measured = ~(np.asarray(columns["bridged"]) > 0.0)
         found = [part for f in found for part in _parts(f, t, measured)]
