@@ -8,6 +8,8 @@ import math
 GRAVITY_MPS2 = 9.80665
 DEG_PER_RAD = 180.0 / math.pi
 RAD_PER_DEG = math.pi / 180.0
+EARTH_RADIUS_M = 6_371_000.0  # mean, of a sphere: Moritz, Geodetic Reference System 1980
+METRES_PER_DEG = RAD_PER_DEG * EARTH_RADIUS_M  # of latitude
 # Standard deviations to either side of a normal distribution's mean that hold 95 % of it.
 NORMAL_95 = 1.96
 # 95 % half-width over an estimate, or over what would contribute 5 % of its row: up to the first it

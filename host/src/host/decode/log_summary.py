@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from host.constants import METRES_PER_DEG
 from host.log import FlightLog
 from host.log.calibration_note import calibration_note
 from host.log.quality import Quality, judge
@@ -174,9 +175,9 @@ def _gps(log: FlightLog) -> Json | None:
     good = data[np.isin(data["fix"], fixes)]
     if not len(good):
         return None
-    north_m = np.ptp(good["latitude"].astype(float)) * 1e-7 * 111_195.0
+    north_m = np.ptp(good["latitude"].astype(float)) * 1e-7 * METRES_PER_DEG
     middle = np.deg2rad(float(good["latitude"].mean()) * 1e-7)
-    east_m = np.ptp(good["longitude"].astype(float)) * 1e-7 * 111_195.0 * np.cos(middle)
+    east_m = np.ptp(good["longitude"].astype(float)) * 1e-7 * METRES_PER_DEG * np.cos(middle)
     return {
         "solutions": len(data),
         "with_fix": len(good),

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 
-from host.constants import RAD_PER_DEG
+from host.constants import METRES_PER_DEG, RAD_PER_DEG
 from host.live.gps_fix import GpsFix
 
-_EARTH_M = 6_371_000.0
 _LEAST_SPEED_MPS = 8.0  # below it the airspeed says nothing
 _LEAST_GROUND_MPS = 4.0  # over ground: slower it stands, is carried, or hovers against the wind
 _MEMORY_S = 20.0  # of the wind's running mean: a circle of a trainer
@@ -67,6 +66,6 @@ def local_m(
     place: tuple[float, float, float], home: tuple[float, float, float]
 ) -> tuple[float, float]:
     """Return metres east and north of home on a sphere: 0.3 % off within a few km."""
-    north = (place[0] - home[0]) * RAD_PER_DEG * _EARTH_M
-    east = (place[1] - home[1]) * RAD_PER_DEG * _EARTH_M * math.cos(home[0] * RAD_PER_DEG)
+    north = (place[0] - home[0]) * METRES_PER_DEG
+    east = (place[1] - home[1]) * METRES_PER_DEG * math.cos(home[0] * RAD_PER_DEG)
     return east, north

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from host.constants import METRES_PER_DEG
 from host.original.rows import OriginalRows
 
 Array = NDArray[np.float64]
@@ -22,7 +23,6 @@ FEWEST_ROWS = 10  # of a stretch: a GPS of the time says something new every fou
 LEAST_WAY_M = 20.0  # of a stretch, in the mean: positions are printed to 1 m
 MOST_SHARE = 0.15  # largest relative half-width with which a rate still serves as a time base
 SLOWEST_MPS = 2.0  # below this speed GPS course is noise
-_DEGREE_M = 111_195.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,7 @@ def _distances(rows: OriginalRows) -> tuple[Array, Array] | None:
     at = np.arange(first, last + 1)
     known = np.flatnonzero(good)
     north, east = (
-        np.interp(at, known, values[known] * _DEGREE_M * scale)
+        np.interp(at, known, values[known] * METRES_PER_DEG * scale)
         for values, scale in (
             (latitude, 1.0),
             (longitude, np.cos(np.radians(np.median(latitude[known])))),

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from host.constants import METRES_PER_DEG
 from host.report.shown_flight import ShownFlight
 
 # Mean of the metres of a degree of latitude on WGS 84: 0.5 % at worst, over 1 km 5 m.
-_METRES_PER_DEG = 111_195.0
 _MOST_POINTS = 3000
 
 
@@ -27,8 +27,8 @@ def ground_track(flight: ShownFlight) -> dict[str, Any] | None:
     if known.sum() < 2:
         return None
     first = int(np.argmax(known))
-    north = (latitude - latitude[first]) * _METRES_PER_DEG
-    east = (longitude - longitude[first]) * _METRES_PER_DEG * np.cos(np.deg2rad(latitude[first]))
+    north = (latitude - latitude[first]) * METRES_PER_DEG
+    east = (longitude - longitude[first]) * METRES_PER_DEG * np.cos(np.deg2rad(latitude[first]))
     return {
         "t_s": [round(float(one), 3) for one in t_s],
         "east_m": _rounded(east),

@@ -16,13 +16,13 @@ import numpy as np
 import pandas as pd
 
 from host.aircraft.airframe import DOWN, NORTH, Array
-from host.constants import GRAVITY_MPS2, RAD_PER_DEG
+from host.constants import EARTH_RADIUS_M, GRAVITY_MPS2, RAD_PER_DEG
 from host.original.printed_pulses import RANGE_US, printed_of_servo, servo_of_stick_us
 from host.twin.flight.fly import STEP_S, FlightRecord
 from host.twin.sensors.analog import analog, convert
 from host.twin.sensors.imu import imu
 from host.twin.sensors.local_flow import AirData
-from host.twin.sensors.ubx import EARTH_RADIUS_M, POSITION_NOISE_M, VELOCITY_NOISE_MPS
+from host.twin.sensors.ubx import POSITION_NOISE_M, VELOCITY_NOISE_MPS
 
 IMU_RATE_HZ = 50.0
 GYRO_COUNTS_PER_DEGPS = 16.4

@@ -12,6 +12,7 @@ import numpy as np
 
 from host.aircraft.airframe import DOWN, NORTH, Q0, Q3, Array, U
 from host.aircraft.attitude import to_body
+from host.constants import METRES_PER_DEG
 from host.physical.airdata import STANDARD_PRESSURE_PA
 from host.twin.flight.draws import PITOT_PA_PER_COUNT
 from host.twin.flight.fly import STEP_S, FlightRecord
@@ -27,7 +28,6 @@ FIRST_S = 0.05
 # An autopilot logs its outputs in the loop that sets them: here when the rudder's pulse has ended,
 # 6 ms into the receiver's frame.
 FIRST_OUTPUT_S = 0.046
-EARTH_RADIUS_M = 6_371_000.0
 HOME_DEG = (30.1, 31.4)
 SEA_LEVEL_DENSITY_KGPM3 = 1.225
 
@@ -115,7 +115,7 @@ def autopilot_senses(record: FlightRecord, data: AirData, rates: Rates) -> Sense
     speed = delayed(record.t_s, velocity, late["gps"], gps_s)
     speed[gps_s < record.card.flight.ground_s] = 0.0
     speed += noisy * SPEED_NOISE_MPS * rng.standard_normal(speed.shape)
-    metres = np.deg2rad(1.0) * EARTH_RADIUS_M
+    metres = METRES_PER_DEG
     return Senses(
         imu_s=imu_s,
         rates_radps=fast.rates_radps,

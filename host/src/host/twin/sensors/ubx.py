@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.aircraft.airframe import DOWN, NORTH, Array
+from host.constants import EARTH_RADIUS_M
 from host.twin.faults import Fault
 from host.twin.flight.fly import STEP_S, FlightRecord
 from host.twin.sensors.sensor_delays import dlpf_for, sensor_delays
 
 RATE_HZ = 5.0
-EARTH_RADIUS_M = 6_371_000.0
 POSITION_NOISE_M = 0.4  # epoch to epoch; the slow error is drawn once per flight
 VELOCITY_NOISE_MPS = 0.1  # u-blox 6 data sheet
 GEOID_M = 15.0
