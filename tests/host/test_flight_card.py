@@ -119,7 +119,7 @@ class FakeLogger:
 
     def __init__(self) -> None:
         self.eeprom = bytearray(b"\xff" * 48 * 35)
-        self.valid, self.refuses, self.now_s = False, "", 0.0
+        self.valid, self.refuses, self.finds, self.now_s = False, "", "crc", 0.0
         self.deaf: set[int] = set()  # numbers of the bytes that are lost
         self.stuck = -1  # an EEPROM byte that keeps its value
         self.seen = 0
@@ -170,7 +170,7 @@ class FakeLogger:
             rows = self.eeprom[3]
             self.valid = rows <= 32 and not card_faults(bytes(self.eeprom[: 48 * (3 + rows)]))
             if not self.valid:
-                self._answer(body[1], "damaged", 0, fault="crc")
+                self._answer(body[1], "damaged", 0, fault=self.finds)
                 return
         elif name == "state" and not self.valid:
             self._answer(body[1], "no_card", 0, fault="not_valid")
@@ -222,6 +222,10 @@ def _refused(result: str) -> Callable[[FakeLogger], None]:
         (_refused("airborne"), "does not know that it stands on the ground"),
         (_refused("eeprom"), "does not keep what is written"),
         (lambda logger: setattr(logger, "stuck", 60), "damaged (crc)"),
+        (
+            lambda logger: logger.__dict__.update(stuck=60, finds="other_version"),
+            "another version than the card (other_version): pio run -t upload",
+        ),
         (lambda logger: logger.deaf.update(range(1, 2000)), "no answer about the flight card"),
     ],
 )

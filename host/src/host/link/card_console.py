@@ -30,6 +30,11 @@ SAID = {
     "request": "it does not know this request: another image than this tool's",
     "eeprom": "its EEPROM does not keep what is written",
 }  # fmt: skip
+# What to do about a fault that its name does not tell.
+TOLD = {
+    "other_version": "the logger's program is of another version than the card (other_version):"
+    " pio run -t upload; of a simulated logger: make sitl",
+}
 
 
 class CardError(DeviceError):
@@ -151,7 +156,8 @@ class CardConsole:
             if answer.result != "airborne" or self._clock() >= until:
                 said = SAID.get(answer.result, answer.result)
                 why = f" ({answer.fault})" if answer.fault != "none" else ""
-                raise CardError(f"{self._link.device}: {said}{why}")
+                said = TOLD.get(answer.fault, f"{said}{why}")
+                raise CardError(f"{self._link.device}: {said}")
             self._listen(FORGETS_S)
         return answer
 
