@@ -20,6 +20,7 @@ from host.live.estimates.flight_estimate import FlightEstimate, FlightEstimator
 from host.planning.card_design import design
 from host.planning.next_point import NextPoints, in_words
 from host.planning.optimal_card import standard_card
+from host.planning.point_widths import test_points
 from host.planning.wanted_widths import WANTED_PERCENT
 from host.twin.testcard.cards import Card, Pilot, Segment, length_s
 
@@ -46,7 +47,7 @@ def next_points() -> NextPoints:
 def standard(way: str) -> tuple[Segment, ...]:
     """Return the test points of a card that knows nothing of the flight, in turn."""
     if way == "designed":
-        points = [s for s in design(AIRCRAFT).segments if s.kind != "trim"]
+        points = test_points(design(AIRCRAFT))
     else:
         points = [replace(s, before_s=3.0) for s in standard_card(load(AIRCRAFT)).segments[1:-1]]
     return tuple((points * MOST_POINTS)[:MOST_POINTS])

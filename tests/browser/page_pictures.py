@@ -3,7 +3,7 @@
     python -m tests.browser.page_pictures            # nine minutes; then look at them
     python -m tests.browser.page_pictures --only learning
 
-The flight is the card that `host plan` designs, with turns, received from its radio. Where the
+The flight is the card that `host plan` designs, received from its radio. Where the
 logger learns, it flies two rows of multisines itself.
 """
 
@@ -23,7 +23,7 @@ from host.planning.flight_envelope import Envelope
 from host.planning.learning_card import learned_axes
 from host.planning.logger_card import logger_card
 from host.twin.outcome.virtual_calibration import calibration
-from host.twin.testcard.cards import Card, Segment
+from host.twin.testcard.cards import Segment
 from studies.learned_in_flight import card as learning_card
 from studies.learned_in_flight import multisine
 from studies.radio_flights import radio_flight
@@ -34,25 +34,13 @@ from tests.browser.served_page import served_page
 AIRCRAFT, SEED = "ultrastick25e", 31
 POINTS = 6  # flown and judged before the picture: of roll and yaw nothing is known yet
 PATIENCE_S = 300.0
-TURN_S = 10.4  # of 180 deg at 17 m/s
 WIDE = Envelope(distance_m=500, alpha_deg=12.0, rates_degps=250.0)
 WALK = "sim:walk/half_travel@4x"
 
 
-def with_turns(card: Card) -> Card:
-    """Return the card with a turn before every second point: it stays within 300 m of home."""
-    turn = Segment("turn", duration_s=TURN_S, bank_deg=30.0)
-    segments: list[Segment] = []
-    points = 0
-    for segment in card.segments:
-        points += segment.kind != "trim"
-        segments += [turn, segment] if segment.kind != "trim" and points % 2 == 0 else [segment]
-    return replace(card, segments=tuple(segments))
-
-
 def flight(folder: Path, into: Path) -> None:
     """Picture the page in flight, on a phone, and when nothing comes any more."""
-    card = with_turns(design(AIRCRAFT))
+    card = design(AIRCRAFT)
     (folder / "plan.toml").write_text(dumps(document(card)), encoding="utf-8")
     flown = radio_flight(card, SEED)
     (folder / "plan.radio").write_bytes(b"".join(part.data for part in flown.sent))
@@ -77,7 +65,7 @@ def flight(folder: Path, into: Path) -> None:
 def learning(folder: Path, into: Path) -> None:
     """Picture what the logger has learned of pitch in a row that it flies."""
     rows = multisine("aileron", 4.0, 6, 6), multisine("elevator", 5.0, 5, 5)
-    card = with_turns(replace(learning_card(), segments=(*rows, Segment("trim", duration_s=3.0))))
+    card = replace(learning_card(), segments=(*rows, Segment("trim", duration_s=3.0)))
     plane = load_aircraft(AIRCRAFT)
     lines = calibration_of_text(calibration(plane), folder / "calibration.toml")
     axes = learned_axes(AIRCRAFT, card, lines)

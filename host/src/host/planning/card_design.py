@@ -15,6 +15,7 @@ from host.aircraft.linearisation import linearise, modes
 from host.aircraft.mode_names import DUTCH_ROLL, SHORT_PERIOD
 from host.aircraft.trim import solve
 from host.planning.card_planning import exact, point_of
+from host.planning.home_turns import with_turns
 from host.twin.flight.fly import fly
 from host.twin.sensors.local_flow import air_data
 from host.twin.testcard.cards import BEFORE_S, Card, Pilot, Segment
@@ -51,7 +52,7 @@ def design(name: str, airspeed_mps: float = 0.0) -> Card:
     Elevator 3-2-1-1 with a unit of 0.3 and a doublet half of 0.5 short-period periods, rudder
     doublet of half dutch-roll periods, aileron doublet long against the roll mode; amplitudes for
     the excursions of `TARGET_EXCURSIONS`, found by flying each input once and scaling (Jategaonkar,
-    Flight Vehicle System Identification, chapter 2).
+    Flight Vehicle System Identification, chapter 2). Turns between them keep it near home.
 
     Parameters
     ----------
@@ -99,7 +100,7 @@ def design(name: str, airspeed_mps: float = 0.0) -> Card:
     segments.append(Segment("trim", duration_s=5.0))
     about = "" if aircraft.straight else f" at {speed:.0f} m/s"
     title = f"{aircraft.title}{about}: three of each input"
-    return replace(flight, title=title, segments=tuple(segments))
+    return with_turns(replace(flight, title=title, segments=tuple(segments)))
 
 
 def document(card: Card) -> dict[str, object]:

@@ -27,7 +27,7 @@ from host.twin.flight.fly import FlightRecord, fly
 from host.twin.flight.pilot import Window
 from host.twin.outcome.ideal import true_table
 from host.twin.sensors.local_flow import AirData, air_data
-from host.twin.testcard.cards import Card, Pilot, Segment, Sensors
+from host.twin.testcard.cards import Card, Pilot, Segment, Sensors, turns_home
 
 # White noise of each output at 100 Hz: two vanes and two pitots averaged, four conversions each,
 # MPU-6000 behind its filter; attitude as good as a filter makes it over one maneuver.
@@ -128,7 +128,7 @@ class Plan:
 
 
 def exact(card: Card) -> Card:
-    """Return the card in calm air, with exact inputs and no faults, at 25 Hz or more.
+    """Return the card in calm air, without turns home, exact inputs, no faults, at 25 Hz or more.
 
     Parameters
     ----------
@@ -143,6 +143,7 @@ def exact(card: Card) -> Card:
     return replace(
         card, air=calm, pilot=pilot, sensors=Sensors(tolerances=False), faults=(),
         flight=replace(card.flight, rate_hz=rate),
+        segments=tuple(s for s in card.segments if not turns_home(s)),
     )  # fmt: skip
 
 

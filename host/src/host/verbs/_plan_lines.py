@@ -20,6 +20,8 @@ COEFFICIENTS = (
 
 
 def print_plan(plan: Plan) -> None:
+    from host.planning.home_turns import turns_before
+
     print(f"{plan.card.title}  [{plan.aircraft.title}, predicted, calm air, exact inputs]\n")
     print("  n  input                     amplitude  pulse   test   dV     alpha  beta   p      q "
           "     r      bank   pitch  load")  # fmt: skip
@@ -48,6 +50,9 @@ def print_plan(plan: Plan) -> None:
             f"  {p.roll_rate_degps:5.0f}  {p.pitch_rate_degps:5.0f}  {p.yaw_rate_degps:5.0f}"
             f"  {p.bank_deg:5.0f}  {p.pitch_deg:5.0f}  {low:4.1f} to {high:3.1f}"
         )
+    before = ", ".join(map(str, turns_before(plan.card)))
+    if before:
+        print(f"  Turn until home is ahead (30 deg of bank) before test point {before}.")
 
 
 def point_as_json(point: PointPromise) -> dict[str, object]:

@@ -136,6 +136,7 @@ def run(args: argparse.Namespace) -> int:
         from host.export.toml import dumps
         from host.planning import card_design
         from host.planning import card_planning as planning
+        from host.planning.home_turns import turns_before
         from host.twin.testcard import cards
     except ImportError as error:
         raise UsageError(f"planning needs {error.name}: {install_hint(error.name)}") from None
@@ -170,6 +171,7 @@ def run(args: argparse.Namespace) -> int:
                     "title": card.title,
                     "aircraft": plan.aircraft.name,
                     "points": [asdict(point) for point in plan.points],
+                    "turns_before": turns_before(card),
                     "bounds": [asdict(bound) for bound in plan.bounds],
                     "refused": plan.refused,
                     "predicted": None if prediction is None else asdict(prediction),

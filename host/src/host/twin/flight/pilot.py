@@ -19,6 +19,7 @@ from host.twin.testcard.cards import (
     duration_s,
     input_s,
     length_s,
+    turns_home,
 )
 from host.twin.testcard.flown_by_logger import AT_ARMED_S, LEVEL_S, SWITCH_S
 from host.twin.testcard.input_shapes import STEPS, staircase
@@ -32,6 +33,7 @@ LET_GO_S = 0.4  # before the trigger the sticks are let go
 RELEASED_S = 0.3  # behind the input the switch goes back
 # On the ground: each stick to both ends, then the sign that enables a flight card.
 STIR_S, SIGN_S, SIGN_END_S = 7.0, 12.0, 15.4
+TURN_RAD = math.radians(30.0)  # most bank of a turn until home is ahead
 AIM_M = 500.0  # from home, ahead or behind: what a pilot steers at
 NOWHERE_M = 1e9
 FULL_RAD = 10.0  # larger than any surface limit, so that the surface goes to its end
@@ -137,7 +139,7 @@ def schedule(
         bank_rad=np.zeros(n),
         airspeed_mps=np.full(n, airspeed_mps),
         switch_us=np.full(n, SWITCH_DIRECT_US),
-        aim_m=np.full((n if by_logger else 0, 2), NOWHERE_M),
+        aim_m=np.full((n if by_logger or any(map(turns_home, card.segments)) else 0, 2), NOWHERE_M),
     )
     heading = math.radians(card.flight.heading_deg)
     ahead = AIM_M * np.array([math.cos(heading), math.sin(heading)])
@@ -152,6 +154,10 @@ def schedule(
         span = slice(round(begin / step_s), round(at / step_s))
         if s.airspeed_mps > 0.0:
             result.airspeed_mps[span] = s.airspeed_mps
+        if turns_home(s):
+            result.aim_m[span] = 0.0  # home
+            result.bank_rad[span] = TURN_RAD
+            continue
         if s.kind == "turn":
             # The wanted bank itself takes a second to roll in and a second to roll out.
             local = t[span] - begin

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 from host.aircraft.airframe import DOWN, EAST, NORTH, Q0, Q1, Q2, Q3, Array
 from host.aircraft.rigid_body import rotate_to_body, rotate_to_ned
 from host.compiled import compiled_part
+from host.constants import GRAVITY_MPS2
 from host.twin.flight.pilot import NOWHERE_M, Orders
 
 # Futaba: neutral 1520 us, +-400 us full throw.
 NEUTRAL_US = 1520.0
 THROW_US = 400.0
 IDLE_US = 1120.0
-STEER_RAD = 0.35  # bank with which the pilot turns towards the aim
+STEER_RAD = 0.35  # bank with which the pilot steers at the aim, where a turn has none of its own
 GAP_US = 300.0  # between the pulses of a sequential receiver
 LINK_OK, LINK_LOST, LINK_PRESET = 0, 1, 2  # state of the radio in one receiver frame
 
@@ -79,10 +80,16 @@ def attitude_held(hands: Hands, orders: Orders, wind: Array, s: Array, i: int, h
     bank = orders.bank_rad[i]
     if len(orders.aim_m) > 0 and orders.aim_m[i, 0] < NOWHERE_M:
         north, east, _ = rotate_to_ned(s, s[0], s[1], s[2])
-        off = math.atan2(orders.aim_m[i, 1] - s[EAST], orders.aim_m[i, 0] - s[NORTH])
-        off -= math.atan2(east, north)
+        to_north, to_east = orders.aim_m[i, 0] - s[NORTH], orders.aim_m[i, 1] - s[EAST]
+        off = math.atan2(to_east, to_north) - math.atan2(east, north)
         off = math.atan2(math.sin(off), math.cos(off))
-        bank += min(max(off, -STEER_RAD), STEER_RAD)
+        most = bank if bank > 0.0 else STEER_RAD
+        circle_m = 2.0 * seen**2 / (GRAVITY_MPS2 * math.tan(most))
+        # An aim that was passed a moment ago is not turned back to.
+        if abs(off) < 0.5 * math.pi or math.hypot(to_north, to_east) > circle_m:
+            bank = min(max(off, -most), most)
+        else:
+            bank = 0.0
     held[1] += weight * hands.bank_gain * (bank - phi)
     held[3] += weight * hands.speed_gain_smpm * slow
 

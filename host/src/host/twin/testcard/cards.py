@@ -239,6 +239,11 @@ def length_s(card: Card, s: Segment) -> float:
     return s.before_s + input_s(s) + card.pilot.hands_off_s
 
 
+def turns_home(s: Segment) -> bool:
+    """Return whether a segment is a turn until home is ahead: one without a bank of its own."""
+    return s.kind == "turn" and s.bank_deg == 0.0
+
+
 def input_s(s: Segment) -> float:
     """Return the length of an input itself."""
     return sum(length for _, length in STEPS.get(s.kind, ())) * s.width_s or s.duration_s

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, field, replace
 
 from host.constants import GRAVITY_MPS2
-from host.twin.testcard.cards import Card, CardError, Segment, length_s
+from host.twin.testcard.cards import Card, CardError, Segment, length_s, turns_home
 
 GROUND_S = 17.0  # the logger makes sure of the ground; sticks stirred, enabling sign, idle
 TILTS_S = 10.0  # tilted behind them, where the card holds axes
@@ -107,6 +107,8 @@ def flown_by_logger(
         legs.turn()
         left_s -= leg_s
     for s in card.segments:
+        if turns_home(s):
+            continue  # the legs have their own
         needed_s = length_s(card, s)
         if s.kind not in ("trim", "turn"):
             needed_s += PREPARE_S
