@@ -45,7 +45,8 @@ def card_of(air: str) -> Card:
     if air == "gusts":
         return demo
     calm = replace(demo.air, turbulence_mps=0.0, wind_north_mps=0.0, wind_east_mps=0.0)
-    return replace(demo, air=calm, segments=demo.segments[:3])
+    first = [s for s in demo.segments if s.kind != "turn"][:3]
+    return replace(demo, air=calm, segments=tuple(first))
 
 
 def rows_of(air: str, seed: int, with_default: bool) -> Iterator[dict[str, object]]:

@@ -12,6 +12,7 @@ from host.twin.outcome.virtual_calibration import calibration
 from host.twin.virtual import virtual_flight
 
 from tests.host.sysid.at_hand import identify_coefficients
+from tests.host.sysid.recorded import STRAIGHT_ON
 
 NAME = "ultrastick25e"
 TEXT = calibration(load(NAME))
@@ -32,7 +33,7 @@ TABLES = {"thrust": ("thrust_share", "CD_0"), "misalignment": ("misalignment_rad
 @pytest.fixture(scope="module")
 def columns() -> dict[str, Array]:
     """Return a flight at 50 Hz: half of the rows show what widens as well as all."""
-    return even_columns(virtual_flight("demo", 41, chain="none").table.iloc[::2])[0]
+    return even_columns(virtual_flight(STRAIGHT_ON, 41, chain="none").table.iloc[::2])[0]
 
 
 def halves(columns: dict[str, Array], path: Path, text: str) -> dict[str, float]:

@@ -24,6 +24,7 @@ from host.twin.virtual import VirtualFlight, virtual_flight
 from scipy import integrate
 
 import host
+from tests.host.sysid.recorded import STRAIGHT_ON
 
 NAME = "ultrastick25e"
 SERVO = ("servo_scale", "servo_zero_rad", "servo_delay_s", "servo_bandwidth_share")
@@ -35,7 +36,7 @@ Intervals = dict[str, tuple[float, float]]
 @pytest.fixture(scope="module")
 def flown() -> VirtualFlight:
     """A flight whose table has the pots, and the commands beside them."""
-    return virtual_flight("demo", 41, chain="none")
+    return virtual_flight(STRAIGHT_ON, 41, chain="none")
 
 
 @pytest.fixture(scope="module")
@@ -192,7 +193,7 @@ def test_servo_response_solves_its_equation() -> None:
 @pytest.fixture(scope="module")
 def recorded() -> VirtualFlight:
     """A flight without pots and without GPS through the recorder, its servos drawn."""
-    card = load("demo")
+    card = load(STRAIGHT_ON)
     pots = ("pot_elevator", "pot_aileron_left", "pot_aileron_right", "pot_rudder")
     faults = (*(Fault("pot_open", 0.0, channel=pot) for pot in pots), Fault("gps_off", 0.0))
     sensors = replace(card.sensors, servo_tolerance=True)

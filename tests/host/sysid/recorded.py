@@ -9,7 +9,11 @@ from host.readers.even_grid import even_columns
 from host.sysid.reconstruction import Compatibility, reconstruct
 from host.twin.virtual import VirtualFlight, virtual_flight
 
+from tests.host.logs import ROOT
+
 NAME = "ultrastick25e"
+# Ten test points with a single turn, in light turbulence.
+STRAIGHT_ON = str(ROOT / "tests" / "data" / "straight_on.toml")
 Columns = dict[str, np.ndarray]
 
 

@@ -108,7 +108,7 @@ def _time_left(tell: Tell) -> Callable[[float], None]:
         nonlocal said
         left_s = (time.monotonic() - began_s) * (1.0 - share) / share
         if not said and left_s > _A_WAIT_S:
-            tell(f"{left_s / 60.0:.0f} minutes of work left; Ctrl-C ends")
+            tell(f"about {left_s / 60.0:.0f} min of work left; Ctrl-C ends")
         said = True
 
     return progress

@@ -52,8 +52,8 @@ from tests.host.sysid.verdicts import verdict_lines, verdict_of
 @pytest.fixture(scope="module")
 def flown() -> tuple[Columns, list[dict[str, Any]], Compatibility]:
     """One recorded flight in light turbulence, its maneuvers, what its sensors are wrong by."""
-    flight, columns = recorded.flown("demo", 901)
-    return columns, flight.maneuvers, recorded.reconstructed("demo", 901)
+    flight, columns = recorded.flown(recorded.STRAIGHT_ON, 901)
+    return columns, flight.maneuvers, recorded.reconstructed(recorded.STRAIGHT_ON, 901)
 
 
 @pytest.fixture(scope="module")

@@ -156,13 +156,16 @@ def test_errors_of_a_recorded_flight_are_inside_their_intervals() -> None:
 
 def test_a_delay_that_the_file_knows_better_stays_as_it_is_there() -> None:
     """In light turbulence it came out 1.3 ms too long, and Cm_q was 3 % small by that."""
-    _, columns = recorded.flown("demo", 4)
+    _, columns = recorded.flown(recorded.STRAIGHT_ON, 4)
     nominal, sd = vane_delay_by_file(INSTRUMENT, columns)
-    delay = recorded.reconstructed("demo", 4)["vane_delay_s"]
+    delay = recorded.reconstructed(recorded.STRAIGHT_ON, 4)["vane_delay_s"]
     assert not delay.data_informed
     assert delay.reason == BY_FILE
     assert delay.prior_half_width == pytest.approx(1.96 * sd, rel=1e-3)
-    assert vane_delay_of(recorded.reconstructed("demo", 4), INSTRUMENT, columns) == (nominal, sd)
+    assert vane_delay_of(recorded.reconstructed(recorded.STRAIGHT_ON, 4), INSTRUMENT, columns) == (
+        nominal,
+        sd,
+    )
     # Vanes that are not those of the file are found all the same.
     slow = {n: late(columns["t_s"], columns[n], 0.008) for n in ("alpha_rad", "beta_rad")}
     found = reconstruct({**columns, **slow}, AIRFRAME, INSTRUMENT)["vane_delay_s"]

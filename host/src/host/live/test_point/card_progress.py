@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from host.planning.next_point import INPUT_NAMES, in_words
 from host.planning.point_widths import point_derivatives
 from host.planning.wanted_input import RESPONSE_S
-from host.twin.testcard.cards import Card, Segment, length_s
+from host.twin.testcard.cards import Card, Segment, length_s, turns_home
 
 AGAIN_S = 3.0  # more than before a new point: trim again, think
 
@@ -56,6 +56,8 @@ def card_points(card: Card) -> list[CardPoint]:
 
 
 def _words(s: Segment) -> str:
+    if turns_home(s):
+        return "turn home"
     if s.kind == "turn":
         return f"turn of {s.duration_s:g} s"
     return f"{' and '.join(s.axes)} {INPUT_NAMES.get(s.kind, s.kind)}"
