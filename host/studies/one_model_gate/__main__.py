@@ -1,6 +1,6 @@
 """Flights of every cell by the method on trial and by coefficients; one table and a verdict.
 
-    python -m studies.one_model_gate --flights 20
+    python -m studies.one_model_gate --method NAME
 
 The seeds were chosen before the first run and nothing was changed after it. Rows go to a file that
 a later run continues.
@@ -23,7 +23,7 @@ from studies.one_model_gate.gate_cells import CELLS
 from studies.one_model_gate.gate_limits import lines
 from studies.stored_rows import Row, flown_rows, rows_file
 
-METHOD, STANDARD = "one-model", "coefficients"
+STANDARD = "coefficients"
 FIRST_SEED, FLIGHTS = 51001, 20
 
 
@@ -38,7 +38,7 @@ def fly(name: str, seed: int) -> list[Row]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Fly what is not in the file yet, then print the table."""
     parser = argparse.ArgumentParser(prog="python -m studies.one_model_gate", description=__doc__)
-    parser.add_argument("--method", default=METHOD, help="of `--model coefficients`, on trial")
+    parser.add_argument("--method", required=True, help="of `--model coefficients`, on trial")
     parser.add_argument("--flights", type=int, default=FLIGHTS, help="of each cell")
     parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
     parser.add_argument("--only", default="", help="cells whose name begins so")

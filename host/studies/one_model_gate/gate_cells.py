@@ -86,18 +86,22 @@ def independent(a: Trainer, air_mps: float, seed: int, method: str | None) -> Fl
     table = with_sensor_errors(measured, rng, a)
     if a is FLYING_WING:
         del table["rudder_rad"]
-    folder = tempfile.mkdtemp(prefix="gate-")
-    file = drawn_file(Path(folder), rng, FILES[a])
+    known = truth_of(true, a)
 
     def identify() -> Identification:
-        truth = Path(folder) / "truth.toml"
-        truth.write_text(dumps(truth_of(true, a)), encoding="utf-8")
-        return host.identify(
-            pd.DataFrame(table), aircraft=file, calibration=SENSORS_FILE, models=MODEL,
-            methods=method, truth=truth,
-        )  # fmt: skip
+        with tempfile.TemporaryDirectory() as folder:
+            truth = Path(folder) / "truth.toml"
+            truth.write_text(dumps(known), encoding="utf-8")
+            return host.identify(
+                pd.DataFrame(table),
+                aircraft=drawn_file(Path(folder), rng, FILES[a]),
+                calibration=SENSORS_FILE,
+                models=MODEL,
+                methods=method,
+                truth=truth,
+            )
 
-    return Flown(truth_of(true, a), identify)
+    return Flown(known, identify)
 
 
 def real_records(air_mps: float, seed: int, method: str | None) -> Flown:
