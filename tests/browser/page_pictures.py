@@ -1,7 +1,7 @@
 """Take the pictures of the pages in `host/*.md` anew: a virtual flight and a virtual walk.
 
-    python -m tests.browser.page_pictures            # nine minutes; then look at them
-    python -m tests.browser.page_pictures --only learning
+    PYTHONPATH=host python -m tests.browser.page_pictures    # nine minutes; then look at them
+    PYTHONPATH=host python -m tests.browser.page_pictures --only learning
 
 The flight is the card that `host plan` designs, received from its radio. Where the
 logger learns, it flies two rows of multisines itself.
