@@ -34,6 +34,7 @@ from tests.browser.served_page import served_page
 AIRCRAFT, SEED = "ultrastick25e", 31
 POINTS = 6  # flown and judged before the picture: of roll and yaw nothing is known yet
 PATIENCE_S = 300.0
+TURN_S = 10.4  # of 180 deg at 17 m/s
 WIDE = Envelope(distance_m=500, alpha_deg=12.0, rates_degps=250.0)
 WALK = "sim:walk/half_travel@4x"
 
@@ -64,8 +65,10 @@ def flight(folder: Path, into: Path) -> None:
 
 def learning(folder: Path, into: Path) -> None:
     """Picture what the logger has learned of pitch in a row that it flies."""
-    rows = multisine("aileron", 4.0, 6, 6), multisine("elevator", 5.0, 5, 5)
-    card = replace(learning_card(), segments=(*rows, Segment("trim", duration_s=3.0)))
+    roll, pitch = multisine("aileron", 4.0, 6, 6), multisine("elevator", 5.0, 5, 5)
+    back = Segment("turn", duration_s=TURN_S, bank_deg=30.0)
+    segments = (roll, back, pitch, Segment("trim", duration_s=3.0))
+    card = replace(learning_card(), segments=segments)
     plane = load_aircraft(AIRCRAFT)
     lines = calibration_of_text(calibration(plane), folder / "calibration.toml")
     axes = learned_axes(AIRCRAFT, card, lines)
