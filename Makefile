@@ -98,7 +98,7 @@ card-images: setup sitl ## 10 000 cards altered at random, under sanitizers, and
 input-flights: setup sitl ## 1000 random flights with a flight card, a fault at any instant of an input (minutes)
 	@$(PYTHON) tests/sitl/input_faults.py $(INPUTS)
 
-hold-flights: setup sitl ## 2000 random flights whose rows hold bank and pitch, 100 more of each fault (an hour)
+hold-flights: setup sitl ## 2000 random flights whose rows hold bank and pitch, 100 more of each fault (twenty minutes of a core)
 	@$(PYTHON) tests/sitl/hold_faults.py $(HOLDS)
 
 ground-triggers: setup sitl ## 10 200 triggers on the ground, none starts a row, and 5400 honest ones; the image on the chip
