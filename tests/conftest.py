@@ -5,8 +5,8 @@ background lets it ignore Ctrl-C, and so its children: those that are to end by 
 The report of a run names the processor time of each case. One that takes more than `MOST_CPU_S`
 of a quiet machine fails, unless it says why it costs more: `@pytest.mark.costs(seconds, "why")`.
 Machines, and one machine with neighbours, differ by `SLOWER`.
-A case marked `campaign` repeats another of its function with another image, seed or input: it runs
-in `make campaign`, before a release.
+A case marked `campaign` repeats others with another image, seed or input, or as one whole day: it
+runs in `make campaign`, before a release.
 Linear algebra has one thread, before numpy is loaded: the matrices are small, and on a busy machine
 threads that spin for them make a fit ten times slower.
 """

@@ -30,6 +30,7 @@ AIRCRAFT = "ultrastick25e"
 SEED = "5"
 
 
+@pytest.mark.campaign
 @pytest.mark.costs(150, "two flights identified, gains designed, a card planned and flown")
 def test_a_day_from_log_to_gains_to_a_held_flight_to_the_model(tmp_path: Path) -> None:
     first, second = tmp_path / "first", tmp_path / "second"
