@@ -25,7 +25,7 @@ from host.sysid.models.state_space_model import LinearModel, has_equations
 from host.sysid.numerics.ar_noise import ArNoise, choose_order, fit_ar, lagged_moments
 from host.sysid.numerics.model_problems import innovation_problem, output_problem
 
-FITTED_SHARE = 2.0 / 3.0  # of a maneuver, from its start (holdout: Kohavi, IJCAI 1995, sec. 2)
+FITTED_SHARE = 2.0 / 3.0  # of a maneuver, from its start
 
 
 def first_part(maneuver: Maneuver) -> Maneuver:
