@@ -12,6 +12,7 @@ from host.preflight.check_list import CheckListInputs, check_list, checked_aircr
 from host.preflight.preflight_sheet import read_sheet, sheet_beside, sheet_lines
 
 from tests.host.logs import ROOT
+from tests.host.preflight.test_hold_check import card
 
 
 def notes_of(folder: Path) -> list[dict[str, object]]:
@@ -53,6 +54,26 @@ def test_a_fault_is_no_go_with_exit_code_6_and_its_reason(
     assert any("against its stick" in why for why in read_sheet(sheet).reasons.values())
     assert "--  relay         left out: listen only" in sheet_lines(sheet.read_text())
     assert "relay" not in tomllib.loads(sheet.read_text())["item"]
+
+
+def test_the_tilts_of_a_card_that_holds_are_walked_and_proven_by_the_recorder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    walked = ["preflight", "sim:walk@max", "--no-page", "--flight-card", "hold.card"]
+    Path("hold.card").write_bytes(card())
+    assert main(walked) == 0
+    (sheet,) = tmp_path.glob("RADIO-*.preflight.toml")
+    proven = tomllib.loads(sheet.read_text())["item"]["hold"]
+    assert (proven["aileron_sense"], proven["elevator_sense"]) == (1.0, -1.0)
+    assert 3.0 < proven["elevator_s"] - proven["aileron_s"] < 8.0
+    sheet.unlink()
+    Path("hold.card").write_bytes(card(turned=[1]))
+    assert main(walked) == 6
+    assert capsys.readouterr().out.splitlines()[-1] == "NO-GO"
+    (sheet,) = tmp_path.glob("RADIO-*.preflight.toml")
+    assert list(read_sheet(sheet).reasons) == ["hold"]
+    assert read_sheet(sheet).reasons["hold"].startswith("elevator: shown was that a longer pulse")
 
 
 def test_a_measured_aircraft_is_walked_round(

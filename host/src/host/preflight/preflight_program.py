@@ -95,7 +95,7 @@ def run_preflight(
     if live.source is not None and live.source.startswith(SIMULATED):
         from host.preflight.walk_source import walk_source
 
-        live.opened = walk_source(live.source, aircraft, live.seed)
+        live.opened = walk_source(live.source, aircraft, live.seed, request.flight_card)
     done: list[_Walk] = []
 
     def join(session: LiveSession, calibration: Calibration) -> Callable[[], None]:

@@ -44,7 +44,7 @@ def add_parser(subparsers: Any) -> None:
         "--flight-card",
         type=Path,
         metavar="FILE",
-        help="the logger's card: asks for the proof of its hold, if it holds",
+        help="the logger's card: asks for the proof of its hold, if it holds; sim:walk gives it",
     )
     parser.add_argument("--list", action="store_true", help="print the checks, and stop")
     parser.add_argument("--sheet", type=Path, metavar="TOML",

@@ -25,6 +25,10 @@ SURFACES = ("elevator", "aileron", "rudder")
 # (firmware/settings.toml, input_switch).
 PRESET_US = {**dict.fromkeys(SURFACES, NEUTRAL_US), "throttle": IDLE_US, "switch": 880.0}
 ROLL, PITCH, YAW = range(3)
+# How a pilot proves the hold of a card (hw/test-inputs.md): right wing down, then nose up, and of
+# each the surface whose stick is at its end against it.
+SIGN_S, PROOF_S = 4.0, 5.5  # aileron and rudder at their ends enable the card; a tilt
+PROOFS = (("aileron", ROLL, -1.0), ("elevator", PITCH, 1.0))
 
 
 @dataclass(slots=True)
@@ -85,16 +89,20 @@ class GroundWalk:
         return self.aircraft.scalar(f"surfaces.{surface}_limit_rad") * DEG_PER_RAD
 
 
-def ground_walk(aircraft: Aircraft, seed: int) -> GroundWalk:
+def ground_walk(aircraft: Aircraft, seed: int, held: Sequence[str] = ()) -> GroundWalk:
     """Draw a walk.
 
     Parameters
     ----------
     aircraft : Aircraft
     seed : int
+    held : sequence of str
+        Surfaces whose hold is proven at the end, behind the sign that enables the card.
     """
     walk = GroundWalk(aircraft, np.random.default_rng([seed, 61]))
     rng, lasts = walk.rng, _durations(walk.rng)
+    if held:
+        lasts["hold"] = SIGN_S + PROOF_S * len(held)
     ends = np.cumsum([round(seconds / STEP_S) for seconds in lasts.values()])
     starts = np.r_[0, ends[:-1]]
     walk.windows = [(n, int(a), int(b)) for n, a, b in zip(lasts, starts, ends, strict=True)]
@@ -116,6 +124,8 @@ def ground_walk(aircraft: Aircraft, seed: int) -> GroundWalk:
     walk.preset = bool(rng.random() < 0.6)
     _switch(walk)
     _transmitter_off(walk)
+    if held:
+        _prove(walk, held)
     return walk
 
 
@@ -195,3 +205,18 @@ def _transmitter_off(walk: GroundWalk) -> None:
     walk.throttle_us = _moved(walk, "failsafe", moves, 0.4)
     t_s = np.arange(len(walk.throttle_us)) * STEP_S - rows.start * STEP_S - 0.4
     walk.transmitter = ~((t_s > off_s) & (t_s < on_s))
+
+
+def _prove(walk: GroundWalk, held: Sequence[str]) -> None:
+    """Enable the card, then tilt the aircraft for each surface, its stick at the end against it."""
+    reach = ((0.0, 0.0), (0.3, 1.0), (SIGN_S - 0.5, 1.0), (SIGN_S - 0.2, 0.0))
+    for surface, way in (("aileron", 1.0), ("rudder", -1.0)):
+        walk.stick[surface] += way * _moved(walk, "hold", reach, 0.0)
+    moves = ((0.0, 0.0), (0.8, 1.0), (PROOF_S - 1.0, 1.0), (PROOF_S - 0.3, 0.0))
+    at_s = SIGN_S
+    for surface, axis, way in PROOFS:
+        if surface in held:
+            tilt = _moved(walk, "hold", moves, at_s)
+            walk.turn_deg[axis] += walk.rng.uniform(20.0, 30.0) * tilt
+            walk.stick[surface] += way * tilt
+            at_s += PROOF_S

@@ -20,6 +20,7 @@ from host.twin.flight.stick_commands import GAP_US
 from host.twin.ground.ground_instrument import START_US, GroundFrames
 from host.twin.ground.ground_walk import GroundWalk
 from host.twin.recorder import sitl
+from host.twin.recorder.flight_card_line import eeprom_with_card
 from host.twin.recorder.recorder_build import recorder_library
 from host.twin.recorder.sitl_library import Port, Sitl
 from host.twin.recorder.stimuli import GPS_BYTE_S, OVERSAMPLING
@@ -42,7 +43,11 @@ Prepare = Callable[[Sitl], None]
 
 
 def recorded_walk(
-    walk: GroundWalk, frames: GroundFrames, prepare: Prepare = lambda _: None
+    walk: GroundWalk,
+    frames: GroundFrames,
+    prepare: Prepare = lambda _: None,
+    *,
+    flight_card: bytes = b"",
 ) -> Iterator[tuple[float, bytes]]:
     """Yield times (us since power-on) and the bytes that the recorder's radio sent up to each.
 
@@ -53,6 +58,8 @@ def recorded_walk(
         As `ground_frames` or `broken_walk` gives them.
     prepare : callable
         Alters the simulated hardware before power-on, for example cuts the relay.
+    flight_card : bytes
+        In its EEPROM; empty for none.
 
     Raises
     ------
@@ -63,8 +70,10 @@ def recorded_walk(
     instrument = Sitl(recorder_library())
     instrument.set_file_blocks(_FILE_BLOCKS)
     try:
-        instrument.insert_card(image, sitl.CARD_ID)
         sitl.configure(instrument, _LOG_RATE_HZ, walk.aircraft.name)
+        if flight_card:
+            instrument.set_eeprom(eeprom_with_card(instrument.eeprom(), flight_card))
+        instrument.insert_card(image, sitl.CARD_ID)
         _give(instrument, frames)
         prepare(instrument)
         instrument.power_on()
