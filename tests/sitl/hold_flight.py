@@ -144,7 +144,8 @@ def hold_flight(
     flight.analog, flight.up = longer(flight.analog, 0.005), longer(flight.up, 0.01)
     flight.place, flight.gps_sent = longer(flight.place, 0.2), longer(flight.gps_sent, 0.2)
     flight.ground_speed_cmps = longer(flight.ground_speed_cmps, 0.2)
-    flight = replace(flight, seconds=seconds)
+    trigger_s = WITHOUT_TILT_S + round(TILTS_S / frame_s) * frame_s
+    flight = replace(flight, seconds=seconds, trigger_s=trigger_s)
     if tilted:
         for begin_s, channel, us, column in (
             (ROLLED_S, AILERON, LEAST_US, 6),

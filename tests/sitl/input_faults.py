@@ -2,9 +2,9 @@
 
     python tests/sitl/input_faults.py --flights 1000 --seed 1
 
-Judged from the script alone: no servo pulse that is neither the pilot's nor the card's, the
-throttle never, the travel never left, plain pulses within the limit of the fault, no input behind
-a reset.
+Every sixth row or so holds bank and pitch. Judged from the script alone: no servo pulse that is
+neither the pilot's nor the card's, a held surface within its authority, the throttle never, the
+travel never left, plain pulses within the limit of the fault, no input behind a reset.
 Ends with a table; 6 if anything was wrong.
 """
 
@@ -26,6 +26,7 @@ from host.twin.recorder.sitl_library import TICKS_PER_S, CardFault, Level
 
 from tests.sitl import flight_cards as cards
 from tests.sitl.bench import Bench
+from tests.sitl.hold_flight import TILTS_S, hold_flight
 from tests.sitl.input_flight import (
     ARMED_US,
     DIRECT_US,
@@ -62,6 +63,13 @@ ROWS = (
 )  # fmt: skip
 
 
+HELD_ROW = cards.row(
+    shape=cards.THREE_TWO_ONE_ONE, axes=4 | 3 << 4, quiet_ms=200, duration_ms=1400,
+    amplitude_us=(0, 0, 150),
+)  # fmt: skip
+HELD_TICKS = tuple(2.0 * us for us in (*cards.HOLD["authority_us"], 0))
+
+
 @dataclass(slots=True)
 class Fault:
     """One fault: what it is called, when it can be known, how soon the pulses must be plain.
@@ -90,7 +98,7 @@ def stick(flight: InputFlight, at_s: float, random: np.random.Generator) -> Faul
     flight.width_us[frame:, channel] += size if random.random() < 0.5 else -size
     known_s = _accepted_s(flight, frame, channel)
     # Moved before the trigger was taken: that is its place at the trigger, and ends nothing.
-    early = known_s < TRIGGER_S + TRIGGER_SLACK_S
+    early = known_s < flight.trigger_s + TRIGGER_SLACK_S
     return Fault("stick", known_s, None if early else PLAIN_S)
 
 
@@ -242,26 +250,37 @@ class Flown:
     fault: str
     wrong: tuple[str, ...]
     started: bool  # a deflected pulse was seen
+    held: bool  # by a row that holds
     plain_s: float | None  # first plain pulse behind the instant it could be known
 
 
 @cache
-def _deflections(row: int) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    return slewed(shape_of(ROWS[row]), cards.HEAD["rate_max_usps"])
+def _deflections(row: bytes) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    return slewed(shape_of(row), cards.HEAD["rate_max_usps"])
+
+
+def drawn_row(random: np.random.Generator) -> bytes:
+    """Return one of the rows."""
+    return (*ROWS, HELD_ROW)[int(random.integers(0, len(ROWS) + 1))]
 
 
 def fly(number: int, seed: int) -> Flown:
     """Fly one drawn flight and judge it."""
     random = np.random.default_rng([seed, number])
-    row = int(random.integers(0, len(ROWS)))
+    row = drawn_row(random)
+    held = row is HELD_ROW
     shape = _deflections(row)
-    end_s = TRIGGER_S + QUIET_S + len(shape) / 1000
-    flight = input_flight(end_s + BEHIND_S, random, float(random.choice(FRAMES_S)))
+    row_s = QUIET_S + len(shape) / 1000
+    seconds = TRIGGER_S + (TILTS_S if held else 0.0) + row_s + BEHIND_S
+    fly_with = hold_flight if held else input_flight
+    flight = fly_with(seconds, random, float(random.choice(FRAMES_S)))
+    trigger_s = flight.trigger_s
     kind = KINDS[number % len(KINDS)]
-    at_s = float(random.uniform(TRIGGER_S - 0.1, end_s + 0.05))
+    at_s = float(random.uniform(trigger_s - 0.1, trigger_s + row_s + 0.05))
     fault = kind(flight, at_s, random)
     bench = Bench()
-    bench.sitl.set_eeprom(cards.eeprom_with(cards.card([ROWS[row]])))
+    card = cards.card([row], hold=cards.HOLD if held else None)
+    bench.sitl.set_eeprom(cards.eeprom_with(card))
     flight.give(bench.sitl)
     bench.sitl.power_on()
     for when_s, act in fault.act:
@@ -269,15 +288,17 @@ def fly(number: int, seed: int) -> Flown:
         fault.known_s += bench.sitl.now() / TICKS_PER_S - when_s  # a turn of the loop, 1 ms at most
         act(bench)
     bench.sitl.run_until(round(flight.seconds * TICKS_PER_S))
-    trigger = Trigger(TRIGGER_S, end_s + TRIGGER_SLACK_S + PLAIN_S, QUIET_S, shape)
+    end_s = trigger_s + row_s + TRIGGER_SLACK_S + PLAIN_S
+    authority = HELD_TICKS if held else (0.0, 0.0, 0.0)
+    trigger = Trigger(trigger_s, end_s, QUIET_S, shape, authority)
     pulses = bench.sitl.pulses()
     wrong = wrong_pulses(pulses, flight, trigger)
-    late = deflected(pulses, flight, max(TRIGGER_S, fault.known_s))
+    late = deflected(pulses, flight, max(trigger_s, fault.known_s))
     plain_s = None if late.size == 0 else float(late[-1]) / TICKS_PER_S + SERVO_S - fault.known_s
     if fault.within_s is not None and plain_s is not None and plain_s > fault.within_s:
         wrong.append(f"{fault.name}: plain {1000 * plain_s:.1f} ms behind")
     wrong += _relay_when_direct(bench, flight)
-    return Flown(fault.name, tuple(wrong), deflected(pulses, flight, 0.0).size > 0, plain_s)
+    return Flown(fault.name, tuple(wrong), deflected(pulses, flight, 0.0).size > 0, held, plain_s)
 
 
 def _relay_when_direct(bench: Bench, flight: InputFlight) -> Iterator[str]:
@@ -316,6 +337,9 @@ def main() -> int:
         begun = sum(f.started for f in flights)
         wrong = sum(bool(f.wrong) for f in flights)
         print(f"| {name} | {len(flights)} | {begun} | {said} | {wrong} |")
+    held = [f for flights in rows.values() for f in flights if f.held]
+    begun, wrong = sum(f.started for f in held), sum(bool(f.wrong) for f in held)
+    print(f"rows that hold: {len(held)} flights, {begun} begun, {wrong} wrong")
     return 6 if bad else 0
 
 

@@ -65,6 +65,8 @@ class InputFlight:
         Of every packet, behind its place.
     apart_us : int
         Rises of two channels; 0: the receiver sends them all at once.
+    trigger_s : float
+        When the switch was at armed for long enough.
     """
 
     seconds: float
@@ -80,6 +82,7 @@ class InputFlight:
     frame_s: float = FRAME_S
     packet_delay_s: float = 0.0
     apart_us: int = 2300
+    trigger_s: float = TRIGGER_S
 
     def receiver(self) -> Receiver:
         """Return the pulses that are sent."""

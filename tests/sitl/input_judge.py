@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,12 +29,15 @@ class Trigger:
         Between the trigger and the shape.
     deflection : (milliseconds, 3) array
         Ticks, 1 ms apart from the beginning of the shape.
+    held_ticks : (3,) sequence
+        Authority over each axis that the row holds, from the trigger on; else 0.
     """
 
     start_s: float
     end_s: float
     quiet_s: float
     deflection: NDArray[np.float64]
+    held_ticks: Sequence[float] = (0.0, 0.0, 0.0)
 
 
 def slewed(shape: NDArray[np.float64], rate_usps: float) -> NDArray[np.float64]:
@@ -94,11 +98,14 @@ def _card_made(
     ms = round((at_s - trigger.start_s - trigger.quiet_s) * 1000)
     lag = round(LAG_S * 1000)
     window = trigger.deflection[max(0, ms - lag) : max(0, ms) + 2, channel]
-    if not window.size:
+    if held := trigger.held_ticks[channel]:
+        low, high = -held, held
+    elif not window.size:
         return "before the shape" if ms < 0 else "behind the shape"
-    low, high = min(0.0, window.min()), max(0.0, window.max())
-    if ms > lag + 5:
+    elif ms > lag + 5:
         low, high = window.min(), window.max()
+    else:
+        low, high = min(0.0, window.min()), max(0.0, window.max())
     slack = STEP_TICKS + near
     if np.any((ticks - base >= low - slack) & (ticks - base <= high + slack)):
         return ""

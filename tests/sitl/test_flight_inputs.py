@@ -13,8 +13,9 @@ from host.wire.schema_text import packed_schema
 from tests.protocol import oracle
 from tests.protocol.log_writer import crc16
 from tests.sitl import flight_cards as cards
+from tests.sitl import input_faults
 from tests.sitl.bench import Bench
-from tests.sitl.input_faults import KINDS, ROWS, fly
+from tests.sitl.input_faults import HELD_ROW, KINDS, ROWS, drawn_row, fly, nothing
 from tests.sitl.input_flight import (
     AILERON,
     ARMED_S,
@@ -194,6 +195,17 @@ def test_receivers_that_hold_cannot_be_told_from_a_pilot() -> None:
 def test_random_flights(number: int) -> None:
     """One flight with each fault of `make input-flights`, at another instant of another row."""
     assert not fly(number, SEED + 1).wrong
+
+
+def test_a_held_surface_beyond_its_authority_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A row that holds, without a fault: within the card's authority, and beyond half of it."""
+    every = range(KINDS.index(nothing), 1000, len(KINDS))
+    number = next(n for n in every if drawn_row(np.random.default_rng([SEED, n])) is HELD_ROW)
+    flown_one = fly(number, SEED)
+    assert (flown_one.held, flown_one.started, flown_one.wrong) == (True, True, ())
+    half = tuple(0.5 * ticks for ticks in input_faults.HELD_TICKS)
+    monkeypatch.setattr(input_faults, "HELD_TICKS", half)
+    assert any("deflected by none" in line for line in fly(number, SEED).wrong)
 
 
 def test_the_judge_sees_a_pulse_of_nobody() -> None:
