@@ -360,14 +360,17 @@ void TestInputs::step_slow(const PilotLink& pilot,
       rc.width_ticks[core::kSwitch] <= config.switch_direct_max_us * core::kTicksPerUs &&
       rc.width_ticks[core::kThrottle] <= config.throttle_idle_max_us * core::kTicksPerUs &&
       travel_.shown();
-  const bool aileron = travel_.at_end(core::kAileron, rc.width_ticks[core::kAileron]);
   if (command_.enabled()) {
-    const uint8_t axis = aileron ? core::kAileron : core::kElevator;
-    const bool shown = resting && tilted(axis, rc, sensors);
-    if (sign_.look(shown, now_us)) prove(axis, rc, outlet, now_us);
+    // One at a time: what is shown of one axis is no time of the other.
+    const bool aileron = tilted(core::kAileron, rc, sensors);
+    const bool shown = resting && aileron != tilted(core::kElevator, rc, sensors);
+    if (sign_.look(shown, now_us)) {
+      prove(aileron ? core::kAileron : core::kElevator, rc, outlet, now_us);
+    }
     return;
   }
-  const bool sign = resting && hash_shown_ && aileron &&
+  const bool sign = resting && hash_shown_ &&
+                    travel_.at_end(core::kAileron, rc.width_ticks[core::kAileron]) &&
                     travel_.at_end(core::kRudder, rc.width_ticks[core::kRudder]);
   if (sign_.look(sign, now_us)) enable(sensors, outlet, now_us);
 }

@@ -37,14 +37,24 @@ from tests.sitl.hold_faults import (
 )
 from tests.sitl.hold_flight import (
     PITCHED_S,
+    ROLLED_S,
     SHOWN_S,
+    TILT,
     TRIGGER_S,
     Motion,
     World,
     fly_closed,
     hold_flight,
 )
-from tests.sitl.input_flight import ELEVATOR, LEAST_US, THROTTLE, InputFlight
+from tests.sitl.input_flight import (
+    AILERON,
+    ELEVATOR,
+    LEAST_US,
+    MOST_US,
+    PACKET_S,
+    THROTTLE,
+    InputFlight,
+)
 
 ENUMS = packed_schema().enums
 EVENT, END, FAULT = ENUMS["event"], ENUMS["input_end"], ENUMS["card_fault"]
@@ -149,6 +159,22 @@ def test_a_tilt_that_is_too_short_or_too_small_proves_nothing(tmp_path: Path) ->
             flight.imu[packets, 7] = 1490
         bench, _ = flown(CARD, flight, world())
         assert why_refused(events(bench, tmp_path)) == END["hold_sense"]
+
+
+def test_the_time_that_one_axis_is_shown_is_not_the_others(tmp_path: Path) -> None:
+    """Tilted both ways, both sticks at their ends; the aileron's leaves it before its 3 s."""
+    flight = calm()
+    frame_s = flight.frame_s
+    flight.imu[round(ROLLED_S / PACKET_S) : round((PITCHED_S + SHOWN_S) / PACKET_S), 6:8] = 0
+    flight.imu[round(ROLLED_S / PACKET_S) : round((ROLLED_S + SHOWN_S) / PACKET_S), 6:8] = TILT
+    rows = slice(round((ROLLED_S + 2.8) / frame_s), round((PITCHED_S + SHOWN_S) / frame_s))
+    flight.width_us[rows, AILERON : ELEVATOR + 1] = 1500
+    both = slice(round(ROLLED_S / frame_s), round((ROLLED_S + SHOWN_S) / frame_s))
+    flight.width_us[both, ELEVATOR] = MOST_US
+    bench, _ = flown(CARD, flight, world())
+    said = events(bench, tmp_path)
+    assert EVENT["hold_sense"] not in said
+    assert why_refused(said) == END["hold_sense"]
 
 
 @pytest.mark.parametrize("axis", [0, 1])
