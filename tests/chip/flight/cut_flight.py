@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 from flight.card_files import BLOCK, findings, frame_sizes, frames_of, put_file, read_file
-from flight.rig import FlightRig
+from flight.flown_row import HOLDS, begin_row
+from flight.rig import GROUND_S, FlightRig, numbered
 from numpy.typing import NDArray
 from simavr_bench import CardKind, cycles
 from simavr_bench.card_journal import CardJournal, CutCard, Journal
@@ -44,6 +45,8 @@ class Plan:
         Busy after every block; length of the stalls, one every 3 s at a random phase (0: none).
     flight_s : float
         Length of the part that cuts are drawn from.
+    holds : bool
+        A row of a flight card is flown meanwhile, from 1.5 s before on, that holds two axes.
     """
 
     name: str
@@ -54,6 +57,7 @@ class Plan:
     busy_s: float = 0.005
     stall_s: float = 0.0
     flight_s: float = 20.0
+    holds: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,13 +142,22 @@ def make_rig(elf: Path, plan: Plan, base: Path, seed: int) -> FlightRig:
 
     rig = FlightRig(
         elf, base, imu_hz=float(plan.rate_hz), busy_s=plan.busy_s, in_place=False,
-        card_kind=plan.kind,
+        card_kind=plan.kind, ground_s=HOLDS.ground_s if plan.holds else GROUND_S,
+        source=HOLDS.source if plan.holds else numbered,
     )  # fmt: skip
     rig.receiver.jitter_us = 1.0
     rig.receiver.seed = seed
     if plan.rate_hz != 100:
         rig.chip.load(settings_image(rate_hz=plan.rate_hz))
     return rig
+
+
+def take_off(rig: FlightRig, plan: Plan) -> None:
+    """Fly until the Mega drives, and a row is flown where the plan has one."""
+    if plan.holds:
+        begin_row(rig, HOLDS)
+    else:
+        rig.take_off()
 
 
 def place_of_file(journal: Journal) -> int:
@@ -176,7 +189,7 @@ def fly(elf: Path, plan: Plan, base: Path, *, seed: int) -> Flight:
     rng = np.random.default_rng(seed)
     rig = make_rig(elf, plan, base, seed)
     journal = CardJournal(rig.card)
-    rig.take_off()
+    take_off(rig, plan)
     begin = rig.chip.cycle - cycles(1.5)
     end = rig.chip.cycle + cycles(plan.flight_s)
     if plan.stall_s:

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 from flight.card_files import BLOCK, findings, read_file
-from flight.cut_flight import FILE_BLOCKS, Flight, Plan, make_rig, place_of_file
+from flight.cut_flight import FILE_BLOCKS, Flight, Plan, make_rig, place_of_file, take_off
 from flight.rig import CRUISE_US, IDLE_US, FlightRig
+from host.wire.schema_text import packed_schema
 from simavr_bench import cycles, in_fork
 from simavr_bench.card_journal import CardJournal, CutCard, Journal
 
@@ -70,7 +71,7 @@ class RebootBench:
         """Fly until the Mega drives."""
         rig = make_rig(elf, plan, base, seed)
         journal = CardJournal(rig.card)
-        rig.take_off()
+        take_off(rig, plan)
         return cls(rig, journal, plan, folder)
 
     def cut(self, wait_cycles: int, boot: NextBoot) -> RebootResult:
@@ -142,6 +143,9 @@ class RebootBench:
         codes = log.frames["event"]["code"]
         if boot.closes and (log.complete != "complete" or 2 not in codes):
             result.wrong.append(f"closed, but the log is {log.complete}")
+        starts = int(np.count_nonzero(codes == packed_schema().number("event", "input_start")))
+        if starts != int(self.plan.holds):
+            result.wrong.append(f"{starts} rows began")
         sessions = len(log.sessions)
         if sessions != (2 if boot.resumes else 1):
             result.wrong.append(f"{sessions} sessions")

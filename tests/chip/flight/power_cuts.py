@@ -4,8 +4,9 @@
     make power-cuts CUTS="--flight 30 --step 40 --reboots 6"
 
 Simulation only. A cut takes everything that comes after it: so one run of the simulated chip, with
-every block the card programmed and when, gives the card of any instant. The next boot is judged as
-the pilot has it, with nothing repaired. The reboots are true cuts: they check that this is so.
+every block the card programmed and when, gives the card of any instant. In two of four flights a
+row holds bank and pitch; no boot goes on with it. The next boot is judged as the pilot has it, with
+nothing repaired. The reboots are true cuts: they check that this is so.
 """
 
 from __future__ import annotations
@@ -28,10 +29,10 @@ from simavr_bench import CardKind
 LARGE = (CardKind.SDHC, 2100, 64)
 SMALL = (CardKind.SDSC, 300, 8)
 PLANS = (
-    Plan("100 Hz, SDHC", *LARGE),
+    Plan("100 Hz, SDHC, a row holds", *LARGE, holds=True),
     Plan("200 Hz, SDSC", *SMALL, rate_hz=200),
     Plan("100 Hz, stalls of 500 ms", *LARGE, stall_s=0.5),
-    Plan("200 Hz, stalls of 250 ms", *SMALL, rate_hz=200, stall_s=0.25),
+    Plan("200 Hz, stalls, holds", *SMALL, rate_hz=200, stall_s=0.25, holds=True),
 )
 
 

@@ -65,6 +65,10 @@ DURING_INPUT = (
 )
 
 
+# The same while a row holds: by the IMU that it holds by, the pilot's link, a reset.
+WHILE_HELD = ("IMU silent", "gyro saturated", "all channels lost", "watchdog reset")
+
+
 @pytest.fixture(scope="module")
 def in_input(flight_elf: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[InInput]:
     """A rig in the middle of a row of a card: for children made by in_fork only."""
@@ -75,15 +79,42 @@ def in_input(flight_elf: Path, tmp_path_factory: pytest.TempPathFactory) -> Iter
     found[0].chip.close()
 
 
+@pytest.fixture(scope="module")
+def in_held_row(flight_elf: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[InInput]:
+    """The same in a row that holds bank and pitch."""
+    from flight.flown_row import HOLDS, input_rig
+
+    found = input_rig(flight_elf, tmp_path_factory.mktemp("in_row"), HOLDS, threshold_volt=0.8)
+    yield found
+    found[0].chip.close()
+
+
 @pytest.mark.parametrize("injected", DURING_INPUT)
 def test_fault_while_a_row_is_flown(in_input: InInput, tmp_path: Path, injected: str) -> None:
+    assert wrong_of(in_input, tmp_path, injected) == []
+
+
+@pytest.mark.parametrize("injected", WHILE_HELD)
+def test_fault_while_a_row_holds(in_held_row: InInput, tmp_path: Path, injected: str) -> None:
+    assert wrong_of(in_held_row, tmp_path, injected) == []
+
+
+def test_a_held_surface_beyond_its_authority_is_said(in_held_row: InInput, tmp_path: Path) -> None:
+    """A flight without a fault, judged as if the card gave a tenth of its authority."""
+    rig, journal, row = in_held_row
+    little = replace(row, authority=tuple(0.1 * cycles for cycles in row.authority))
+    wrong = wrong_of((rig, journal, little), tmp_path, "none")
+    assert [one.partition(" at ")[2].partition(",")[0] for one in wrong] == ["aileron", "elevator"]
+
+
+def wrong_of(flown: InInput, folder: Path, injected: str) -> list[str]:
     from flight.faults.rows import FAULTS
     from flight.faults.run import run_fault
     from simavr_bench import in_fork
 
-    rig, journal, row = in_input
+    rig, journal, row = flown
     fault = next(fault for fault in FAULTS if fault.injected == injected)
-    assert in_fork(partial(run_fault, rig, journal, fault, tmp_path, row)).wrong == []
+    return in_fork(partial(run_fault, rig, journal, fault, folder, row)).wrong
 
 
 def test_an_input_that_goes_on_or_is_nobodys_is_said(in_input: InInput, tmp_path: Path) -> None:

@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 @pytest.fixture(scope="module")
 def flight(flight_elf: Path, tmp_path_factory: pytest.TempPathFactory) -> Flight:
-    """One flight on a card of 300 MiB."""
+    """One flight on a card of 300 MiB, in a row that holds."""
     from flight.cut_flight import Plan, fly, make_base
     from simavr_bench import CardKind
 
     folder = tmp_path_factory.mktemp("cuts")
-    plan = Plan("short", CardKind.SDSC, 300, 8, flight_s=6.0, stall_s=0.5)
+    plan = Plan("short", CardKind.SDSC, 300, 8, flight_s=6.0, stall_s=0.5, holds=True)
     return fly(flight_elf, plan, make_base(plan, folder / "base.img", 5), seed=5)
 
 
@@ -95,6 +95,14 @@ def test_true_cut_and_the_next_boot(flight: Flight, reboots: RebootBench, boot: 
 
     assert compare_with(flight, reboots) == ""
     assert reboots.cut(31_234_567, BOOTS[boot]).wrong == []
+
+
+def test_a_row_that_begins_behind_a_cut_is_noticed(flight: Flight, reboots: RebootBench) -> None:
+    """The row of before the cut, judged as if none had been flown."""
+    from flight.cut_reboot import BOOTS
+
+    none = replace(reboots, plan=replace(flight.plan, holds=False))
+    assert none.cut(31_234_567, BOOTS[1]).wrong == ["1 rows began"]
 
 
 def altered(journal: Journal, rows: list[int]) -> Journal:

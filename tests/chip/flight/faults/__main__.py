@@ -2,7 +2,7 @@
 
     make faults                       the table
     make faults FAULTS="--only IMU"   rows whose text holds this
-    make faults FAULTS="--during-input"   the faults in flight while a row of a card is flown
+    make faults FAULTS="--during-input"   in flight while a row teaches, then while one holds
 
 Simulation only. Every fault starts from the same state, in flight with the Mega driving; the log is
 decoded and the file system checked afterwards; the table is run with the threshold of the relay's
@@ -16,6 +16,7 @@ import shutil
 import sys
 import tempfile
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ from flight.faults.rows import FAULTS
 from flight.faults.run import ready_rig, run_fault
 from flight.faults.strange import run_strange
 from flight.faults.swapped import run_swaps
-from flight.flown_row import input_rig
+from flight.flown_row import HOLDS, TEACHES, RowCard, input_rig
 from flight.images import build_image
 from flight.rig import THRESHOLDS_VOLT
 from simavr_bench import in_fork
@@ -44,15 +45,16 @@ def line(fault: Fault, seen: Outcome) -> str:
 
 
 def run_table(
-    elf: Path, folder: Path, threshold_volt: float, *, only: str, during_input: bool
+    elf: Path, folder: Path, threshold_volt: float, flown: RowCard | None, *, only: str
 ) -> tuple[int, float]:
     """Print every row with one transistor; gives the wrong ones and the lowest gate voltage."""
-    print(f"threshold of the relay's transistor {threshold_volt} V")
+    meanwhile = f", while a row {flown.does}" if flown else ""
+    print(f"threshold of the relay's transistor {threshold_volt} V{meanwhile}")
     head = f"{'injected':31} {'expected':33} {'gap':>4} {'lost':>5} {'back':>6} {'gate':>5}"
     print(f"{'#':3} {head}  seen in the log", flush=True)
     row = None
-    if during_input:
-        rig, journal, row = input_rig(elf, folder, threshold_volt=threshold_volt)
+    if flown:
+        rig, journal, row = input_rig(elf, folder, flown, threshold_volt=threshold_volt)
     else:
         rig, journal = ready_rig(elf, folder, threshold_volt=threshold_volt)
     bad, gate_volt = 0, float("inf")
@@ -63,7 +65,7 @@ def run_table(
         bad += bool(seen.wrong)
         gate_volt = float(np.fmin(gate_volt, seen.beats.gate_volt))
         print(line(fault, seen), flush=True)
-    if during_input:  # a card that is swapped is one that was pulled, until the ground
+    if flown:  # a card that is swapped is one that was pulled, until the ground
         return bad, gate_volt
     more, volt = run_swaps(rig, journal, only=only)
     return bad + more, min(gate_volt, volt)
@@ -74,8 +76,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--only", default="", help="rows whose text holds this")
     parser.add_argument(
-        "--during-input", action="store_true", help="while a row of a flight card is flown"
-    )
+        "--during-input", action="store_true",
+        help="while a row of a flight card teaches, and while one holds",
+    )  # fmt: skip
     parser.add_argument(
         "--threshold", type=float, choices=THRESHOLDS_VOLT, help="of one transistor only, V"
     )
@@ -87,12 +90,11 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         elf = Path(shutil.copy(build_image("mega2560"), folder / "firmware.elf"))
-        for threshold_volt in THRESHOLDS_VOLT:
+        rows = (TEACHES, HOLDS) if options.during_input else (None,)
+        for threshold_volt, flown in product(THRESHOLDS_VOLT, rows):
             if options.threshold not in (None, threshold_volt):
                 continue
-            wrong, volt = run_table(
-                elf, folder, threshold_volt, only=options.only, during_input=options.during_input
-            )
+            wrong, volt = run_table(elf, folder, threshold_volt, flown, only=options.only)
             bad += wrong
             volts.append(volt)
         if not options.during_input:
