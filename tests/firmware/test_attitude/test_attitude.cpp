@@ -189,6 +189,7 @@ TEST_CASE("a coordinated turn at 60 deg does not pull it level when the speed is
   }
 }
 
+#ifndef __AVR__  // 49 000 steps: what an int of 16 bits changes shows in the six seconds above
 TEST_CASE(
     "a minute of turning at 30 deg is learned from where the speed is known, else not at all") {
   // 18 m/s: g tan(30) / V = 0.3145 rad/s, 25 deg/s of q and r together: between the 16 deg/s up to
@@ -220,6 +221,7 @@ TEST_CASE(
     CHECK_EQ(off(filter.attitude.phi_cdeg(), 3000) <= 150, speed_cmps != 0);
   }
 }
+#endif
 
 TEST_CASE(
     "a saturated gyro makes the attitude invalid for ten seconds, a saturated accelerometer not") {
