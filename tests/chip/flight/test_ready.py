@@ -52,7 +52,10 @@ def ready_times_s(elf: Path, image: Path, until_s: float) -> tuple[float, float,
     return first_s, at_s[0], at_s[-1]
 
 
-@pytest.mark.parametrize(("cluster_blocks", "whole_s"), [(8, 12.0), (2, 24.0), (1, 40.0)])
+@pytest.mark.parametrize(
+    ("cluster_blocks", "whole_s"),
+    [(8, 12.0), pytest.param(2, 24.0, marks=pytest.mark.campaign), (1, 40.0)],
+)
 def test_a_file_is_ready_although_the_ground_is_known_late(
     flight_elf: Path, tmp_path: Path, cluster_blocks: int, whole_s: float
 ) -> None:

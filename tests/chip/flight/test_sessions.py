@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from simavr_bench.card_journal import CardJournal
 
 MakeRig = Callable[..., "FlightRig"]
-RESUMED_S = 2.0
+RESUMED_S, LOOK_S = 2.0, 0.1
 PHASES_MS = tuple(range(0, 78, 3))  # a block is written every 73 ms, sent within 8
 
 
@@ -31,7 +31,11 @@ def resumed_s(rig: FlightRig, journal: CardJournal, cause: str, wait_ms: float) 
     rig.chip.run_s(wait_ms / 1000)
     rig.receiver.width_us[3] = 1000.0  # idle: the mark in .noinit alone decides
     rig.chip.reset(ResetCause[cause])
-    rig.chip.run_s(RESUMED_S + 0.5)
+    for _ in range(round(RESUMED_S / LOOK_S)):
+        rig.chip.run_s(LOOK_S)
+        if journal.records()["begun"][-1] > rig.started[-1]:
+            break
+    rig.chip.run_s(0.5)
     rows = journal.records()
     place = rows["block"].astype(np.int64) - place_of_file(rows)
     later = rows["begun"] > rig.started[-1]
