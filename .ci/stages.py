@@ -30,9 +30,8 @@ BIN = Path(sys.executable).parent
 PYTHON = sys.executable
 
 # A stage keeps one core busy and waits now and then, for a device's silence or a bus in real time.
-# Four at a time at the most, and as many processes of tests/host: each may take 0.7 GB.
-CORES = min(4, os.cpu_count() or 1)
-WORKERS = min(4, 1 + CORES)
+# Four at a time at the most: each may take 0.7 GB.
+WORKERS = min(4, 1 + (os.cpu_count() or 1))
 TAIL_LINES = 40
 SLOWEST = 20
 GENERATOR = re.compile(r"/generate(_\w+)?\.py$")
@@ -114,8 +113,8 @@ def stages() -> list[Stage]:
         *pytest_stages(),
     ]
     # What others need first, then the longest: the last to end is a short one.
-    first = ("mega", "library", "host", "answers", "chip", "types", "native", "avr", "sitl")
-    return sorted(found, key=lambda stage: (*first, stage.name).index(stage.name))
+    first = ("mega", "library", "sysid", "host", "answers", "chip", "types", "native", "avr")
+    return sorted(found, key=lambda stage: (*first, "sitl", stage.name).index(stage.name))
 
 
 def unit_tests(name: str, environment: str, title: str) -> Stage:
@@ -131,21 +130,27 @@ def unit_tests(name: str, environment: str, title: str) -> Stage:
 
 
 def pytest_stages() -> Iterator[Stage]:
-    """Describe one stage per folder of tests/ that pytest can run.
+    """Describe one stage per folder of tests/ that pytest can run, two for tests/host.
 
-    Half of all processor time is in tests/host: one process would end long after all others, so
-    each core has one, and takes the next file when it is through with its last.
+    Half of all processor time is in tests/host: in one process it would end long after all others.
+    Its identification is the half of it. Each imports and collects what is its own.
     """
     needs = {"sitl": ("library",), "chip": ("mega",)}
-    after = {"host": ("mega", "library"), "chip": ("library",), "layering": ("mega",)}
-    divided = {"host": (f"--numprocesses={CORES}", "--dist=loadfile")}
+    built = ("mega", "library")
+    after = {"host": built, "sysid": built, "chip": ("library",), "layering": ("mega",)}
     folders = {path.relative_to(ROOT / "tests").parts[0] for path in _test_files()}
-    for name in sorted(folders - {"firmware"}):
+    parts: dict[str, tuple[str, ...]] = {
+        name: (f"tests/{name}",) for name in folders - {"firmware"}
+    }
+    if "host" in parts:
+        parts["sysid"] = ("tests/host/sysid",)
+        parts["host"] += ("--ignore=tests/host/sysid",)
+    for name, chosen in sorted(parts.items()):
         report = f"--junit-xml={report_path(name)}"
         yield Stage(
             name,
-            f"pytest tests/{name}",
-            ((PYTHON, "-m", "pytest", f"tests/{name}", *divided.get(name, ()), report),),
+            f"pytest {chosen[0]}",
+            ((PYTHON, "-m", "pytest", *chosen, report),),
             needs=needs.get(name, ()),
             after=after.get(name, ()),
             report=True,
