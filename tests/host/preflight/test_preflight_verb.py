@@ -67,6 +67,7 @@ def test_the_tilts_of_a_card_that_holds_are_walked_and_proven_by_the_recorder(
     proven = tomllib.loads(sheet.read_text())["item"]["hold"]
     assert (proven["aileron_sense"], proven["elevator_sense"]) == (1.0, -1.0)
     assert 3.0 < proven["elevator_s"] - proven["aileron_s"] < 8.0
+    assert [note for note in notes_of(tmp_path) if note.get("state") == "failed"] == []
     sheet.unlink()
     Path("hold.card").write_bytes(card(turned=[1]))
     assert main(walked) == 6

@@ -138,15 +138,17 @@ def _packets(ident: Any, t_s: Array) -> tuple[list[int], int, list[bytes]]:
     rows = kind.rows(len(at_s))
     count = np.arange(len(at_s))
     rows["seq"], rows["t_us"] = count & 0xFF, np.round(at_s * 1e6).astype(np.int64)
+    # Before the walk it rests as at its beginning, noise and all.
+    of_s = t_s[0] + np.abs(at_s - t_s[0])
     for name in RAW:
-        rows[name] = np.round(np.interp(at_s, t_s, ident[name]))
+        rows[name] = np.round(np.interp(of_s, t_s, ident[name]))
     full = np.max([np.abs(rows[name].astype(np.int64)) for name in RAW[:6]], axis=0) >= 32767
     valid = ("attitude_valid", "mag_valid", "offsets_valid")
     rows["flags"] = sum(schema.bit("imu_flags", name) for name in valid)
     rows["flags"] |= np.where(full, schema.bit("imu_flags", "gyro_saturated"), 0).astype(np.uint8)
     rows["aux_kind"] = schema.number("imu_aux", "magnetometer")
     rows["age"] = round(AGE_S / (kind.scale("age") * 1e-6))
-    nearest = np.minimum(np.searchsorted(t_s, at_s), len(ident) - 1)
+    nearest = np.minimum(np.searchsorted(t_s, of_s), len(ident) - 1)
     sent = (ident["p"][nearest] != OFF) & (ident["p"][np.maximum(nearest - 1, 0)] != OFF)
     starts = np.round((at_s + AGE_S) * TICKS_PER_S).astype(np.int64)
     sealed = kind.sealed(rows)
