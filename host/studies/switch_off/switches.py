@@ -79,10 +79,6 @@ def _bare(model: Any, _: float, start: Any) -> Any:
     return model, start
 
 
-def _full(lengths: Any, *_: Any, **__: Any) -> Any:
-    return 1.0, 1.0
-
-
 def _vane_zero(estimate: Any, *_: Any) -> Any:
     return estimate
 
@@ -199,7 +195,10 @@ SWITCHES = (
         _vane_zero,
     ),
     _one(
-        "step lengths", "shortens steps that turn back", "reconstruction.path_fit:_lengths", _full
+        "step lengths",
+        "shortens steps that turn back",
+        "reconstruction.path_fit:_length",
+        gives(1.0),
     ),
     _one(
         "headings",

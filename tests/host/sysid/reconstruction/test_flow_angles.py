@@ -20,7 +20,6 @@ from host.twin.testcard.cards import load
 from studies.no_vanes import of_an_autopilot
 
 from tests.host.readers.autopilot_flights import truth, write
-from tests.host.sysid.recorded import STRAIGHT_ON
 
 AIRCRAFT = "ultrastick25e"
 
@@ -106,7 +105,7 @@ def test_the_path_of_a_short_flight_is_found(tmp_path: Path) -> None:
 
 def test_a_tilted_imu_costs_no_path(tmp_path: Path) -> None:
     """Lift and side force lean into ax by 1.5 deg: speed moved 1.51 times as fast as it said."""
-    card = load(STRAIGHT_ON)
+    card = load("demo")
     card = replace(card, air=replace(card.air, turbulence_mps=0.0),
                    sensors=replace(card.sensors, servo_tolerance=True))  # fmt: skip
     record = fly(card, seed=11789, errors=of_an_autopilot())

@@ -89,7 +89,9 @@ def test_strapdown_flies_a_level_turn() -> None:
     np.testing.assert_allclose(C[-1], rotation(bank, 0.0, heading), atol=1e-9)
 
 
-def test_slopes_are_those_of_finite_differences() -> None:
+@pytest.mark.parametrize("turned_rad", [0.0, 0.2])
+def test_slopes_are_those_of_finite_differences(turned_rad: float) -> None:
+    """Also where the search has turned the first guess of attitude already."""
     rng = np.random.default_rng(3)
     n, block = 200, 2
     t = np.arange(n)[:, None] * 0.01
@@ -111,7 +113,8 @@ def test_slopes_are_those_of_finite_differences() -> None:
     names = prepare_path_problem(columns, AIRFRAME, INSTRUMENT)[0].common
     prior = dict.fromkeys(names, (0.0, 0.01))
     problem = PathProblem([segment], outputs, prior, np.full(6, 0.1), block)
-    theta = problem.prior_mean
+    turned = np.array([name.startswith("turn_") for name in problem.names])
+    theta = problem.prior_mean + turned_rad * turned
     response = problem.respond(theta)
     assert response is not None
     for k in range(len(theta)):

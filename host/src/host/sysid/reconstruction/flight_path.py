@@ -18,6 +18,7 @@ from host.sysid.reconstruction.strapdown import (
     cross,
     path_sensitivities,
     rotation_from_vector,
+    rotation_slope,
     strapdown,
 )
 
@@ -191,6 +192,7 @@ class PathProblem:
             self._inertial_place,
             self._wind_place,
             common,
+            rotation_slope(own[3:6]),
             step_s,
             0.5 / self.block,  # the first block begins half a sample early
             width,

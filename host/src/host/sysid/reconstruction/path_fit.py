@@ -51,11 +51,7 @@ LARGEST_STEP = 4.0  # in prior deviations
 # points change for ever (4 of 34 right records in gusts). As soon as AR models and instruments
 # stay, a step is as long as the last one should have been to leave nothing along it (Irons & Tuck,
 # Int. J. Numerical Methods in Engineering 1, 1969, p. 275).
-# Without vanes steps may go round, too: a flight of 49 s did about its bank, each step 1.2 times
-# the one before. Where they do not shrink they are shortened. With vanes that would end where
-# they agree with nothing: sensors of another aircraft did (thor75).
-SHRINKS = 0.8  # over two steps
-SHORTER, SHORTEST = 0.5, 0.125  # of a step
+SHORTEST = 0.125  # of a step
 
 
 @dataclass(frozen=True)
@@ -98,8 +94,7 @@ def _search(problem: PathProblem, lagged_inputs: Sequence[Array], patience: int)
     instruments: dict[int, list[Array]] = {}
     air = np.isin(problem.names, AIR_ERRORS)
     converged, near = False, False
-    length, longest, last = 1.0, 1.0, np.zeros(len(theta))
-    sizes, shrinks = [np.inf, np.inf], np.inf if lagged_inputs[0].shape[1] else SHRINKS
+    length, last = 1.0, np.zeros(len(theta))
     iteration = 0
     origin, least_cost, halvings = theta, np.inf, 0
     constrained, adapt_from = bool(patience), max(patience, ADAPT_FROM)
@@ -119,7 +114,10 @@ def _search(problem: PathProblem, lagged_inputs: Sequence[Array], patience: int)
         adapting = adapt_from <= iteration < adapt_from + ADAPTING_ITERATIONS
         adapted_to = None
         if adapting:
-            noise, adapted_to = _fit_ar_noises(problem, residuals), lagged_inputs
+            noise = _fit_ar_noises(problem, residuals)
+            # Least squares takes the slopes of each step: a tilt of the IMU and of every attitude
+            # leave so little of each other that slopes of another step stand across it.
+            adapted_to = lagged_inputs if lagged_inputs[0].shape[1] else None
         rows = _rows(problem, responses, residuals, noise, instruments, adapted_to)
         inverse, g = _solved(problem, theta, precision, rows)
         if converged or iteration == MOST_ITERATIONS + patience:
@@ -128,9 +126,9 @@ def _search(problem: PathProblem, lagged_inputs: Sequence[Array], patience: int)
         step = inverse @ g
         error_size = np.sqrt(np.maximum(np.abs(np.diag(inverse)), 1e-300))
         largest = float(np.max(np.abs(step) / error_size))
-        sizes.append(largest)
-        now, since = step / error_size, iteration - adapt_from
-        length, longest = _lengths((length, longest), (last, now), since, sizes, shrinks)
+        now = step / error_size
+        if iteration > adapt_from + ADAPTING_ITERATIONS:
+            length = _length(length, last, now)
         last = now
         theta = theta + length * _limited(step, problem.prior_precision)
         iteration += 1
@@ -213,37 +211,6 @@ def _limited(step: Array, prior_precision: Array) -> Array:
     return np.asarray(np.clip(step, -most, most))
 
 
-def _lengths(
-    lengths: tuple[float, float],
-    steps: tuple[Array, Array],
-    since: int,
-    sizes: Sequence[float],
-    shrinks: float,
-) -> tuple[float, float]:
-    """Return the length of a step and the longest, from those of the last.
-
-    Parameters
-    ----------
-    lengths : tuple of float
-        The last length, and the longest.
-    steps : tuple of Array
-        The last step and this one, in standard errors.
-    since : int
-        Iterations since AR models and instruments are adapted.
-    sizes : sequence of float
-        Largest component of all steps, this one included.
-    shrinks : float
-        Share of the size before the last that a step may have.
-    """
-    length, longest = lengths
-    if since > ADAPTING_ITERATIONS:
-        length = min(_length(length, *steps), longest)
-    if since > 2 and sizes[-1] > shrinks * sizes[-3]:
-        longest = max(SHORTER * longest, SHORTEST)
-        length = min(length, longest)
-    return length, longest
-
-
 def _length(length: float, last: Array, step: Array) -> float:
     """Return the length of a step from that of the last, both in standard errors."""
     turned = float(last @ (last - step)) / float(last @ last)
@@ -281,8 +248,6 @@ def _instruments(
     ar_model: ArNoise,
 ) -> list[Array]:
     """Return the projection of whitened sensitivities on surfaces, slow drift and wind."""
-    if not lagged_inputs[0].shape[1]:
-        return list(slopes)
     common = len(problem.common)
     wind = [k for k, name in enumerate(problem.common) if name.startswith("wind_")]
     count = len(slopes)

@@ -90,6 +90,7 @@ def path_sensitivities(
     place: IntArray,
     wind: IntArray,
     own: int,
+    turn_slope: Array,
     step_s: float,
     early: float,
     width: int,
@@ -116,6 +117,8 @@ def path_sensitivities(
         Columns of the wind to north and east, -1 if known.
     own : int
         First column of the initial errors: of velocity, then of attitude.
+    turn_slope : Array, shape (3, 3)
+        `rotation_slope` of the initial attitude's rotation vector.
     step_s, early : float
         Length of a block, s, and the share of the first block before the first sample.
     width : int
@@ -134,7 +137,7 @@ def path_sensitivities(
     attitude_error = _integral_to_middle(
         _sensor_error_effect(C, rates, size[0], place[0], width), step_s, early
     )
-    attitude_error[:, axes, own + 3 + axes] += 1.0
+    attitude_error[:, :, own + 3 : own + 6] += turn_slope
     acceleration_error = _sensor_error_effect(C, force, size[1], place[1], width) - np.cross(
         force_ned[:, :, None], attitude_error, axis=1
     )
@@ -192,6 +195,21 @@ def rotation_from_vector(vector: Array) -> Array:
     return np.asarray(
         np.eye(3) + np.sin(angle) / angle * K + (1.0 - np.cos(angle)) / angle**2 * (K @ K)
     )
+
+
+def rotation_slope(vector: Array) -> Array:
+    """Return the small rotation, earth axes, by which a change of a rotation vector turns further.
+
+    The left Jacobian (3, 3) of Barfoot, State Estimation for Robotics, eq. 7.77. It is the unit
+    matrix only where nothing is turned yet.
+    """
+    angle = float(np.linalg.norm(vector))
+    x, y, z = vector
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    if angle < 1e-9:
+        return np.asarray(np.eye(3) + 0.5 * K)
+    half = (1.0 - np.cos(angle)) / angle**2
+    return np.asarray(np.eye(3) + half * K + (angle - np.sin(angle)) / angle**3 * (K @ K))
 
 
 def cross(vector: Array, series: Array) -> Array:
