@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 from host.aircraft.file import load_measured, read_document
-from host.aircraft.mass_properties import RECTANGLE
 from host.arrays import Array
 from host.compiled import prefer_machine_code
+from host.constants import EVEN_SD
 from host.errors import IdentificationError
 from host.export.toml import dumps
 from host.instrument.instrument_errors import (
@@ -112,7 +112,7 @@ def _standing(record: FlightRecord, data: AirData) -> dict[str, object]:
     geometry = {
         **geometry,
         "ground_pitch_rad": pitch + off,
-        "ground_pitch_tolerance_rad": INCLINOMETER_RAD / RECTANGLE,
+        "ground_pitch_tolerance_rad": INCLINOMETER_RAD / EVEN_SD,
     }
     return {**document, "geometry": geometry}
 

@@ -12,6 +12,19 @@ EARTH_RADIUS_M = 6_371_000.0  # mean, of a sphere: Moritz, Geodetic Reference Sy
 METRES_PER_DEG = RAD_PER_DEG * EARTH_RADIUS_M  # of latitude
 # Standard deviations to either side of a normal distribution's mean that hold 95 % of it.
 NORMAL_95 = 1.96
+MEDIAN_TO_SIGMA = 1.4826  # standard deviation of a normal distribution over its median deviation
+EVEN_SD = 1.0 / math.sqrt(3.0)  # standard deviation of an even distribution over its half-width
+# Weights fall beyond as many deviations; 95 % efficient on normal residuals: Huber, Robust
+# Statistics, 1981.
+HUBER_LIMIT = 1.345
+POSTERIOR_PRIOR_RATIO = 0.7  # of deviations: below it the data tell, above it what was known before
+CERTAIN_SD = 3.0  # deviations that chance exceeds once in 370 times
+SIGNIFICANCE = 0.01  # of a test: how often chance may reject what is right
+ENTANGLED = 0.9  # correlation of two estimates: what is wrong of one is wrong of both
+STEEPEST_SINE = 0.5  # of a path; a steeper one is an error of the velocity down
 # 95 % half-width over an estimate, or over what would contribute 5 % of its row: up to the first it
 # is trusted, up to the second used with care. Everything that judges a width reads these two.
 TRUST_SHARE, CARE_SHARE = 0.10, 0.30
+# Of the largest contribution to an equation: a smaller parameter is measured against what would
+# contribute as much.
+SMALL_SHARE = 0.05

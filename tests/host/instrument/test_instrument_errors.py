@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from host.aircraft.file import load
 from host.aircraft.mass_properties import airframe_data
+from host.constants import EVEN_SD
 from host.errors import CalibrationError
 from host.instrument.deviations import deviations, sensor_error_model
 from host.instrument.instrument_errors import (
-    UNIFORM_SD_PER_HALF_WIDTH,
     instrument_errors,
     standard_errors,
 )
@@ -124,7 +124,7 @@ source = "flash lamp and oscilloscope"
     assert scale.of_mean("alpha_a", "alpha_b") == pytest.approx(0.01)  # of one value, not of two
     assert scale.of_mean("beta_a", "beta_b") == pytest.approx(0.01 / math.sqrt(2.0))
     late = errors["delay_share"]
-    assert late.sigma("alpha_b") == pytest.approx(0.3 * UNIFORM_SD_PER_HALF_WIDTH)
+    assert late.sigma("alpha_b") == pytest.approx(0.3 * EVEN_SD)
     draws = [
         draw(plane, np.random.default_rng(k), tolerances=True, errors=errors) for k in range(300)
     ]
@@ -133,7 +133,7 @@ source = "flash lamp and oscilloscope"
     assert np.all(drawn[:, 2] != drawn[:, 3])
     assert np.std(drawn[:, 0]) == pytest.approx(0.01, rel=0.2)
     # Beyond an even distribution of the same deviation.
-    assert np.abs(drawn[:, 0]).max() > 0.01 / UNIFORM_SD_PER_HALF_WIDTH
+    assert np.abs(drawn[:, 0]).max() > 0.01 / EVEN_SD
 
 
 @pytest.mark.parametrize(

@@ -8,13 +8,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from host.aircraft.aircraft_ranges import UNKNOWN_ANGLE_RAD
 from host.aircraft.file import load_measured
 from host.arrays import Array
+from host.constants import EVEN_SD
 
-RECTANGLE = 1.0 / np.sqrt(3.0)  # standard deviation of an even distribution over its half width
 Place = tuple[float, float, float]
 
 
@@ -23,9 +21,10 @@ class AirframeData:
     """Mass, inertia, reference sizes, sensor positions with their relative uncertainties.
 
     Positions are in metres from the CG, x forward, y right, z down; relative numbers are standard
-    deviations. `upwash` is the share by which the vanes over-read. Arms reach from the nominal CG
-    back to where a tail surface's control force acts; 0 means unknown. `ground_pitch_rad` is the
-    pitch angle of the x axis on the wheels; if nobody measured it, its deviation is infinite.
+    deviations, zero where nobody says one. `upwash` is the share by which the vanes over-read. Arms
+    reach from the nominal CG back to where a tail surface's control force acts; 0 means unknown.
+    `ground_pitch_rad` is the pitch angle of the x axis on the wheels; if nobody measured it, its
+    deviation is infinite.
     """
 
     name: str
@@ -37,15 +36,15 @@ class AirframeData:
     wing_area_m2: float
     span_m: float
     chord_m: float
-    mass_share: float = 0.01
-    inertia_share: float = 0.05
+    mass_share: float = 0.0
+    inertia_share: float = 0.0
     imu_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     vanes_m: tuple[tuple[float, float, float], ...] = ()
     upwash: float = 0.0
-    upwash_share: float = 0.2
+    upwash_share: float = 0.0
     elevator_arm_m: float = 0.0
     rudder_arm_m: float = 0.0
-    arm_share: float = 0.06
+    arm_share: float = 0.0
     ground_pitch_rad: float = 0.0
     ground_pitch_sd_rad: float = math.inf
 
@@ -79,18 +78,18 @@ def airframe_data(source: str) -> AirframeData:
         wing_area_m2=number("geometry.wing_area_m2"),
         span_m=number("geometry.span_m"),
         chord_m=number("geometry.chord_m"),
-        mass_share=number("mass.mass_tolerance") * RECTANGLE,
-        inertia_share=number("mass.inertia_tolerance") * RECTANGLE,
+        mass_share=number("mass.mass_tolerance") * EVEN_SD,
+        inertia_share=number("mass.inertia_tolerance") * EVEN_SD,
         imu_m=place(vector("sensors.imu_m") - cg),
         vanes_m=tuple(place(vector(f"sensors.vane_{k}_m") - cg) for k in "ab"),
         upwash=number("sensors.upwash"),
         upwash_share=number("sensors.upwash_tolerance"),
         elevator_arm_m=number("geometry.elevator_arm_m"),
         rudder_arm_m=number("geometry.rudder_arm_m"),
-        arm_share=number("geometry.arm_tolerance") * RECTANGLE,
+        arm_share=number("geometry.arm_tolerance") * EVEN_SD,
         ground_pitch_rad=number("geometry.ground_pitch_rad"),
         ground_pitch_sd_rad=(
-            standing_rad * RECTANGLE if standing_rad < UNKNOWN_ANGLE_RAD else math.inf
+            standing_rad * EVEN_SD if standing_rad < UNKNOWN_ANGLE_RAD else math.inf
         ),
     )
 

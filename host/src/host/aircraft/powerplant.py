@@ -25,6 +25,7 @@ History = Callable[[RotorInputs, float, float, int], Array]
 SUBSTEPS = 3  # Euler steps per 33 Hz sample: a rotor's time constant is 0.1 s or more
 START_RADPS = 600.0  # a guess whose effect is gone within half a second
 SETTLED, SETTLING_S = 200, 0.03  # samples until a rotor keeps its speed, and their distance
+STEP_MPS, STEP_SHARE = 0.5, 0.01  # of airspeed and density: central differences
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,8 +85,9 @@ class Powerplant:
             air = np.full(SETTLED, density_kgpm3 * (1.0 + denser))
             return float(self.run(np.full(SETTLED, throttle), around, air, SETTLING_S)[0][-1])
 
-        by_speed = thrust(0.5, 0.0) - thrust(-0.5, 0.0)
-        return by_speed, (thrust(0.0, 0.01) - thrust(0.0, -0.01)) / 0.02
+        by_speed = (thrust(STEP_MPS, 0.0) - thrust(-STEP_MPS, 0.0)) / (2.0 * STEP_MPS)
+        by_density = (thrust(0.0, STEP_SHARE) - thrust(0.0, -STEP_SHARE)) / (2.0 * STEP_SHARE)
+        return by_speed, by_density
 
 
 class NoPropulsionError(AircraftError):

@@ -14,12 +14,12 @@ from functools import cache
 from pathlib import Path
 
 from host.aircraft.file import Aircraft
+from host.constants import EVEN_SD
 from host.errors import CalibrationError
 from host.physical.calibration import Calibration, Line, load_calibration
 from host.physical.recording import OWN, SURFACES
 
 STANDARD, NO_FILE = (Path(__file__).with_name(f"{name}.toml") for name in ("standard", "no_file"))
-UNIFORM_SD_PER_HALF_WIDTH = 1.0 / math.sqrt(3.0)  # "even" in the files
 DISTRIBUTIONS = ("even", "normal")
 DRAWN = ("instrument", "flight")
 CALIBRATION_FILE, AIRCRAFT_FILE = "calibration file", "aircraft file"
@@ -315,7 +315,7 @@ def _apply_table(error: NamedError, table: Mapping[str, object], where: str) -> 
             raise CalibrationError(f"{where} is {distribution} and has half_width, expected sigma")
         width = _one_per_sensor(table[key], len(error.sensors), f"{where} {key}")
         if key == "sigma" and distribution == "even":
-            width = tuple(w / UNIFORM_SD_PER_HALF_WIDTH for w in width)
+            width = tuple(w / EVEN_SD for w in width)
     if not width:
         raise CalibrationError(f"{where} has no sigma")
     return replace(
@@ -330,7 +330,7 @@ def _apply_table(error: NamedError, table: Mapping[str, object], where: str) -> 
 
 def _sd_per_width(distribution: str) -> float:
     """Return the standard deviation of a distribution over its width."""
-    return UNIFORM_SD_PER_HALF_WIDTH if distribution == "even" else 1.0
+    return EVEN_SD if distribution == "even" else 1.0
 
 
 def _one_per_sensor(value: object, count: int, where: str) -> tuple[float, ...]:

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from host.constants import NORMAL_95
+from host.constants import HUBER_LIMIT, MEDIAN_TO_SIGMA, NORMAL_95
 from host.wire.blocks import KIND_FRAMES, Blocks
 from host.wire.frames import FrameSet
 
 WRAP_US = 1 << 32
 _SCALE_LIMIT = 0.02  # a ceramic resonator is good to 0.5 %; more than 2 % is no clock
 _MIN_FIXES = 20
-_MIN_SPAN_S = 20.0
+MIN_SPAN_S = 20.0
 _MAX_HALF_WIDTH = 500e-6  # a fit with a wider interval is not used
 _CONVERGED = 1e-9  # of the scale: a thousandth of a ppm
 
@@ -127,7 +127,7 @@ def fit_gps(parts: list[tuple[NDArray[np.int64], NDArray[np.int64]]]) -> ClockFi
 
     Notes
     -----
-    Iteratively reweighted least squares with Huber's weights at 1.345 robust standard deviations.
+    Iteratively reweighted least squares with Huber's weights, of robust standard deviations.
     """
     parts = [part for part in parts if len(part[0]) >= 3]
     count = sum(len(part[0]) for part in parts)
@@ -148,9 +148,9 @@ def fit_gps(parts: list[tuple[NDArray[np.int64], NDArray[np.int64]]]) -> ClockFi
             return None
         before, slope = slope, float(np.sum(weight * xc * yc)) / spread
         residual = yc - slope * xc
-        sigma = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
+        sigma = MEDIAN_TO_SIGMA * float(np.median(np.abs(residual - np.median(residual))))
         sigma = max(sigma, 1e-4)  # GPS times of week are whole milliseconds
-        weight = np.minimum(1.0, 1.345 * sigma / np.maximum(np.abs(residual), 1e-12))
+        weight = np.minimum(1.0, HUBER_LIMIT * sigma / np.maximum(np.abs(residual), 1e-12))
         if abs(slope - before) < _CONVERGED:
             break
     # Latency wanders slowly: first-order correlation r leaves n (1 - r)/(1 + r) independent fixes.
@@ -159,7 +159,7 @@ def fit_gps(parts: list[tuple[NDArray[np.int64], NDArray[np.int64]]]) -> ClockFi
         lagged = float(np.clip(np.corrcoef(residual[1:], residual[:-1])[0, 1], 0.0, 0.95))
     half_width = NORMAL_95 * sigma / np.sqrt(spread) * np.sqrt((1 + lagged) / (1 - lagged))
     span_s = float(max(t[-1] for t in t_s))
-    good = half_width <= _MAX_HALF_WIDTH and span_s >= _MIN_SPAN_S and abs(slope) <= _SCALE_LIMIT
+    good = half_width <= _MAX_HALF_WIDTH and span_s >= MIN_SPAN_S and abs(slope) <= _SCALE_LIMIT
     return ClockFit(slope, float(half_width), count, span_s, sigma * 1e3, bool(good))
 
 

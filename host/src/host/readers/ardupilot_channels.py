@@ -15,6 +15,7 @@ from host.physical.airdata import KELVIN, density_kgpm3
 from host.readers.ardupilot_outputs import SURFACES, moves_a_surface, surfaces, unknown_outputs
 from host.readers.autopilot_log import AutopilotLog, Messages
 from host.readers.named_channels import (
+    SERVO_HZ,
     STANDARD_DENSITY_KGPM3,
     STANDARD_TEMPERATURE_DEGC,
     Channels,
@@ -24,7 +25,6 @@ from host.readers.named_channels import (
 from host.readers.written_parameters import made_of_outputs
 
 FIX_3D = 3
-SERVO_HZ = 50.0
 OUTPUTS = ("RCOU", "RCO2", "RCO3")  # outputs 1 to 14, 15 to 18, 19 to 32
 SAME_SET_S = 2e-3
 

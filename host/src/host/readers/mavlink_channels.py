@@ -21,7 +21,13 @@ from host.readers.ardupilot_outputs import (
     unknown_outputs,
 )
 from host.readers.autopilot_log import AutopilotLog, Messages
-from host.readers.named_channels import STANDARD_DENSITY_KGPM3, Channels, instance_of, numbers
+from host.readers.named_channels import (
+    SERVO_HZ,
+    STANDARD_DENSITY_KGPM3,
+    Channels,
+    instance_of,
+    numbers,
+)
 from host.readers.px4_outputs import surfaces_of_pulses
 from host.readers.written_parameters import made_of_outputs
 
@@ -105,7 +111,7 @@ def _outputs(log: AutopilotLog, found: Channels) -> None:
         if f"servo{k}_raw" in out.fields
     }
     made, by = _surfaces(log, out.t_s, pulses)
-    found.output_period_s = 1.0 / max(log.parameters.get("SERVO_RATE", 50.0), 1.0)
+    found.output_period_s = 1.0 / max(log.parameters.get("SERVO_RATE", SERVO_HZ), 1.0)
     for name, share in made.shares.items():
         found.add(name, out.t_s, share, made.made_of[name])
     found.clipped |= {name: many for name, many in made.clipped.items() if many}

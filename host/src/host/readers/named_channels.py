@@ -15,6 +15,7 @@ from host.readers.signals import Signal
 
 STANDARD_DENSITY_KGPM3 = 1.225  # ICAO, sea level: the density for which indicated airspeed is true
 STANDARD_TEMPERATURE_DEGC = 15.0
+SERVO_HZ = 50.0  # pulses of analogue servos; ArduPilot's default of SERVO_RATE
 # Limits that no aircraft of this size exceeds; a value beyond comes from a changed bit.
 RANGES = {
     "p_radps": 40.0, "q_radps": 40.0, "r_radps": 40.0,
@@ -52,7 +53,7 @@ class Channels:
     notes: list[str] = field(default_factory=list)
     unknown_outputs: str = ""
     clipped: dict[str, int] = field(default_factory=dict)
-    output_period_s: float = 0.02
+    output_period_s: float = 1.0 / SERVO_HZ
     vibration_mps2: float = float("nan")
 
     def true_over_indicated(self, t_s: Array) -> Array:

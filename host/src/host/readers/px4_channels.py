@@ -14,7 +14,13 @@ from host.arrays import Array, BoolArray
 from host.physical.airdata import KELVIN, density_kgpm3
 from host.readers.ardupilot_outputs import Outputs
 from host.readers.autopilot_log import AutopilotLog, Messages
-from host.readers.named_channels import STANDARD_DENSITY_KGPM3, Channels, instance_of, numbers
+from host.readers.named_channels import (
+    STANDARD_DENSITY_KGPM3,
+    STANDARD_TEMPERATURE_DEGC,
+    Channels,
+    instance_of,
+    numbers,
+)
 from host.readers.px4_outputs import (
     MOST_SURFACES,
     allocated_surfaces,
@@ -45,7 +51,7 @@ FORCE_TOPICS = (
 
 def px4_channels(log: AutopilotLog, chosen: Mapping[str, int]) -> Channels:
     """Return the channels of a ULog; `chosen` names instances by topic."""
-    found = Channels(output_period_s=1.0 / 50.0)
+    found = Channels()
     if by := tailsitter(log):
         found.notes.append(NOTE.format(by))
     for name in chosen:
@@ -156,7 +162,8 @@ def _air(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
                 values = numbers(messages.fields[theirs])
                 found.add(ours, messages.t_s, values, f"{label}.{theirs}")
         if "density_kgpm3" not in found.signals and "static_pa" in found.signals:
-            warm = messages.fields.get("baro_temp_celcius", np.full(len(messages), 15.0))
+            usual = np.full(len(messages), STANDARD_TEMPERATURE_DEGC)
+            warm = messages.fields.get("baro_temp_celcius", usual)
             rho = density_kgpm3(
                 numbers(messages.fields["baro_pressure_pa"]),
                 numbers(warm) + KELVIN,

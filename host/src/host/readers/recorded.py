@@ -18,13 +18,14 @@ import numpy as np
 from host.arrays import Array
 from host.constants import NORMAL_95
 from host.physical.recording import FOREIGN, SURFACES, Recording
+from host.physical.timebase import MIN_SPAN_S
 
 if TYPE_CHECKING:
     from host.log import FlightLog
     from host.readers.column_map import Line
 
 OWN_COLUMN = "mega_drives"  # no table of others has this column
-GPS_COLUMN, GPS_SPAN_S = "v_north_mps", 20.0  # as `physical/timebase` wants it
+GPS_COLUMN = "v_north_mps"
 SAME_ANGLE_RAD = 2e-6  # a table of text has six decimals, each pot and the mean rounded
 MATCHING_SHARE = 0.5  # of the samples
 
@@ -48,7 +49,7 @@ def recording_of_table(columns: Mapping[str, Array], said: Mapping[Any, Any]) ->
     fix_times_s = (
         columns["t_s"][np.isfinite(columns[GPS_COLUMN])] if GPS_COLUMN in columns else np.empty(0)
     )
-    checked = len(fix_times_s) > 0 and float(np.ptp(fix_times_s)) >= GPS_SPAN_S
+    checked = len(fix_times_s) > 0 and float(np.ptp(fix_times_s)) >= MIN_SPAN_S
     return Recording(commanded, 0.0 if checked else None)
 
 

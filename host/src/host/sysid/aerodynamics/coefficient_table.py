@@ -14,7 +14,7 @@ import numpy as np
 from host.aircraft.gains import coefficient_slopes, dimensional_name
 from host.aircraft.mass_properties import AirframeData, Condition
 from host.arrays import Array
-from host.constants import NORMAL_95
+from host.constants import NORMAL_95, STEEPEST_SINE
 from host.instrument.deviations import dynamic_pressure_share
 from host.instrument.error_list import QBAR, conversion_cause
 from host.instrument.instrument_errors import InstrumentErrors, standard_errors
@@ -215,4 +215,4 @@ def _pitch_over_path(mean: Mapping[str, float], airspeed_mps: float) -> float:
     if not airspeed_mps > 0.0 or "theta_rad" not in mean:
         return 0.0
     sine = -mean.get("v_down_mps", 0.0) / airspeed_mps
-    return float(mean["theta_rad"] - np.arcsin(np.clip(sine, -0.5, 0.5)))
+    return float(mean["theta_rad"] - np.arcsin(np.clip(sine, -STEEPEST_SINE, STEEPEST_SINE)))

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from host.constants import ENTANGLED
 from host.sysid.answer.doubt import Doubt, Evidence, doubt
 from host.sysid.answer.marks import Judged, share_text
 from host.sysid.answer.trust_rules import (
-    ENTANGLED,
     Rule,
     impossible_sign,
     input_feedback,

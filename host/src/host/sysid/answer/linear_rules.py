@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from host.constants import SIGNIFICANCE
 from host.sysid.answer.correlated_inputs import derivatives_of_both
 from host.sysid.answer.doubt import Doubt, Evidence, doubt
 from host.sysid.answer.parameter_places import leaning_on
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
 AIRSPEED = "airspeed_mps"
 WORSE_THAN_NONE = 1.0  # NRMSE: the mean would do better
-WHITE_P = 0.01  # of Ljung-Box: above it the residual is a sensor's noise
 NEAR_BOUND = 1e-6  # of a bound's distance to the start, or of its size
 
 
@@ -92,7 +92,8 @@ def _as_gusts_make(allowed: Mapping[str, Prediction], fit: SignalFit) -> bool:
 
 def fails(fit: SignalFit) -> bool:
     """Return whether an output is not explained, and not because a sensor is noisy."""
-    return not fit.nrmse < FAILS and not (fit.nrmse < WORSE_THAN_NONE and fit.ljung_box_p > WHITE_P)
+    white = fit.ljung_box_p > SIGNIFICANCE
+    return not fit.nrmse < FAILS and not (fit.nrmse < WORSE_THAN_NONE and white)
 
 
 def unpredicted_states(answer: Answer) -> dict[str, str]:

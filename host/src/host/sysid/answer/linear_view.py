@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from host.constants import CARE_SHARE
+from host.constants import CARE_SHARE, ENTANGLED
 from host.sysid.answer.correlated_inputs import correlated_inputs
 from host.sysid.answer.feedback_pairs import alike_derivatives, combined_derivatives
 from host.sysid.answer.linear_rules import (
@@ -22,7 +22,6 @@ from host.sysid.answer.marks import SMALL, UNSURE, USELESS, Judged, mark_of, sha
 from host.sysid.answer.parameter_places import leaning_on
 from host.sysid.answer.servo_lines import servo_lines
 from host.sysid.answer.trust_rules import (
-    ENTANGLED,
     Rule,
     impossible_sign,
     input_feedback,

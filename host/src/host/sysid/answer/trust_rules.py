@@ -18,7 +18,6 @@ from host.sysid.checks.data_finding import open_channels
 if TYPE_CHECKING:
     from host.sysid.answer.estimate_view import EstimateView
 
-ENTANGLED = 0.9  # correlation: what is wrong of one is wrong of both
 Rule = Callable[[Any, Evidence], list[Doubt]]  # of a view
 
 

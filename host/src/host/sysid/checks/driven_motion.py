@@ -14,9 +14,10 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtri
+from scipy.special import chdtrc, chdtri
 
 from host.arrays import Array
+from host.constants import CERTAIN_SD
 from host.sysid.checks.identity_factors import LARGEST_FACTOR, Identity
 from host.sysid.numerics.first_order_filter import first_order_filter
 
@@ -27,9 +28,9 @@ SENSOR_SHARE, SENSOR_DELAY_S = 0.1, 0.03  # scale, delay and place of right sens
 UNKNOWN_SHARE = 0.1  # of a motion, that they make of it in other ways
 REPEATS = 1e-10  # of the largest on a triangle's diagonal: the past may repeat itself
 SHORTEST_S = 19.0  # of 20 with its ends: a trend of a shorter record is explained by chance
-CERTAIN = 9.0  # of a chi-square of one unknown: three deviations
+CERTAIN = CERTAIN_SD**2  # of a chi-square of one unknown
 LIKELIER = 1.0  # of the same, one deviation: below it two units are alike
-CERTAIN_P = 0.0027  # the same, as what chance exceeds
+CERTAIN_P = float(chdtrc(1, CERTAIN))  # the same, as what chance exceeds
 RIGHT = (1.0 / LARGEST_FACTOR, 1.0, LARGEST_FACTOR)
 TRIED = tuple(10.0 ** (0.1 * k) for k in range(-20, 21))
 

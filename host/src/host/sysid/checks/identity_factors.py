@@ -12,10 +12,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from host.arrays import Array
+from host.constants import CERTAIN_SD
 
 SIGN_CORRELATION, FACTOR_CORRELATION = 0.5, 0.25  # partial: less tells nothing of either
 LARGEST_FACTOR = 1.5
-CHANCE = 3.0  # deviations, of a slope of the speed, which gusts along the path change too
 RIGHT_SHARE = 0.1  # of a motion, that scales of right sensors make of it
 
 
@@ -120,7 +120,7 @@ def may_be_one(f: Factor) -> bool:
     """Return whether a factor may be one: of a speed gusts along the path leave more open."""
     if f.high < 0.0:
         return not f.certain
-    chance = CHANCE * f.chance if f.law.name == "airspeed_mps" else 0.0
+    chance = CERTAIN_SD * f.chance if f.law.name == "airspeed_mps" else 0.0
     within = LARGEST_FACTOR * (1.0 + chance)
     return f.low <= within and f.high >= 1.0 / within
 

@@ -13,13 +13,14 @@ from types import MappingProxyType
 import numpy as np
 
 from host.arrays import Array
-from host.constants import GRAVITY_MPS2
+from host.constants import GRAVITY_MPS2, STEEPEST_SINE
 from host.sysid.checks.identity_factors import Identity, correlation, factors, may_be_one, without
 
 ANGLE_EXPLAINED = 0.3  # of an angle's rate that the gyro explains: less is another signal
 WIND_ANGLE_EXPLAINED = 0.05  # the same of a wind angle, which gusts turn too
 BLOCK_S, SLOW_S = 0.1, 0.5  # slopes are those of means over this long; slow: pitot and GPS
 FEWEST = 32  # means
+STEEPEST_RAD = 1.2  # attitude rates are singular at a pitch of 90 deg
 ALONG, ACROSS = ("elevator_rad",), ("aileron_rad", "rudder_rad")  # what drives which
 DRIVING_RAD = 0.05  # a surface that swings less is a hand that answers, not a test input
 # Right sensors: tilt of an IMU, zero of a vane, delay of a pitot, one deviation each; and thrust
@@ -55,7 +56,7 @@ def _fast(m: Mapping[str, Array]) -> Iterator[Identity]:
     zero = np.zeros(len(m["t_s"]))
     phi, theta = m.get("phi_rad", zero), m.get("theta_rad", zero)
     alpha, beta = m.get("alpha_rad", zero), m.get("beta_rad", zero)
-    steep = np.clip(theta, -1.2, 1.2)
+    steep = np.clip(theta, -STEEPEST_RAD, STEEPEST_RAD)
     p, q, r = (m.get(f"{k}_radps", zero) for k in "pqr")
     # What is small in level flight goes beside: too little to be judged itself.
     roll_yaw = np.sin(phi) * q + np.cos(phi) * r
@@ -190,7 +191,7 @@ def _pitch_over_path(m: Mapping[str, Array]) -> Array:
     if "v_down_mps" not in m:
         return np.zeros(len(m["t_s"]))
     climb = -m["v_down_mps"] / np.maximum(m["airspeed_mps"], 1.0)
-    return np.asarray(m["theta_rad"] - np.arcsin(np.clip(climb, -0.5, 0.5)))
+    return np.asarray(m["theta_rad"] - np.arcsin(np.clip(climb, -STEEPEST_SINE, STEEPEST_SINE)))
 
 
 def _law(

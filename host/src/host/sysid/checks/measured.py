@@ -109,7 +109,7 @@ def _without_spikes(t: Array, values: Array) -> tuple[Array, list[str]]:
     seen = np.isfinite(values)
     if seen.sum() < FEWEST:
         return values, []
-    low, middle, high = np.quantile(values[seen], (0.02, 0.5, 0.98))
+    low, middle, high = np.quantile(values[seen], (SPIKE_SHARE, 0.5, 1.0 - SPIKE_SHARE))
     far = np.flatnonzero(seen & (np.abs(values - middle) > SPIKE_RANGES * (high - low)))
     if not 0 < len(far) < SPIKE_SHARE * seen.sum() or high <= low:
         return values, []

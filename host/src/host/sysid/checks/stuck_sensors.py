@@ -13,6 +13,7 @@ import numpy as np
 from host.arrays import Array, BoolArray
 from host.constants import GRAVITY_MPS2
 from host.readers.column_sampling import runs
+from host.sysid.checks.kinematic_identities import STEEPEST_RAD
 
 USUALLY, MISSED = 0.95, 1.5  # of the windows as long; times the most that they miss
 STEPS = 3.0  # of a quantised value, that motion must cross
@@ -133,10 +134,11 @@ def expected_motion(columns: Mapping[str, Array], name: str) -> Array | None:
     weight = GRAVITY_MPS2 * np.cos(theta)
     level = "theta_rad" in c and "airspeed_mps" in c
     turning = q * np.sin(phi) + r * np.cos(phi)
+    steep = np.clip(theta, -STEEPEST_RAD, STEEPEST_RAD)
     rates = {
         "theta_rad": ("q_radps" in c, q * np.cos(phi) - r * np.sin(phi)),
-        "phi_rad": ("p_radps" in c, p + np.tan(np.clip(theta, -1.2, 1.2)) * turning),
-        "psi_rad": ("r_radps" in c, turning / np.cos(np.clip(theta, -1.2, 1.2))),
+        "phi_rad": ("p_radps" in c, p + np.tan(steep) * turning),
+        "psi_rad": ("r_radps" in c, turning / np.cos(steep)),
         "alpha_rad": (
             "q_radps" in c and "az_mps2" in c and level,
             q + (c.get("az_mps2", zero) + weight * np.cos(phi)) / speed,

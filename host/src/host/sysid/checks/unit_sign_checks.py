@@ -11,19 +11,18 @@ from collections.abc import Mapping
 import numpy as np
 
 from host.arrays import Array
-from host.constants import GRAVITY_MPS2
+from host.constants import CERTAIN_SD, GRAVITY_MPS2
 from host.sysid.checks.data_finding import HINT, Finding
 from host.sysid.checks.identity_factors import SIGN_CORRELATION, correlation
 from host.sysid.checks.kinematic_checks import consistent
 from host.sysid.checks.kinematic_identities import BLOCK_S, FEWEST, block_means
-from host.sysid.maneuvers.maneuver_detection import THROTTLE
+from host.sysid.maneuvers.free_response import MOVED_RAD
+from host.sysid.maneuvers.maneuver_detection import FLYING_SHARE, THROTTLE
 
 BOUNDED = ("alpha_rad", "beta_rad", "theta_rad")
 DOUBTFUL_RAD = 1.0  # of such an angle in flight, and of a surface at any moment
 NUMERICAL_RAD = 1e-9  # that a simulation moves one by that nobody moved
-IDLE_RAD = 0.0035  # a surface that swings less between its ends excites nothing
 SIGN_DEVIATIONS = 10.0  # deviations
-EXCHANGED_DEVIATIONS = 3.0  # of both surfaces, where chance alone would be one in a million
 RATES = ("p_radps", "q_radps", "r_radps")
 WITHOUT_GRAVITY = 0.5  # of the size: with less along z, weight is not in it
 DENSITY = (0.4, 1.6)
@@ -64,7 +63,7 @@ def airborne(columns: Mapping[str, Array]) -> tuple[dict[str, Array], float]:
     flying = np.ones(len(columns["t_s"]), dtype=bool)
     if "airspeed_mps" in columns:
         speed = np.abs(columns["airspeed_mps"])
-        flying = speed > 0.5 * float(np.median(speed))
+        flying = speed > FLYING_SHARE * float(np.median(speed))
     flying &= ~(columns.get("bridged", np.zeros(len(flying))) > 0.0)
     return {k: v[flying] for k, v in columns.items()}, dt_s
 
@@ -103,7 +102,7 @@ def _surface_sizes(flown: Mapping[str, Array]) -> list[Finding]:
         size, swing = max(-float(low), float(high)), float(high - low)
         if size > DOUBTFUL_RAD:
             findings.append(_degrees("surface-size", name, size, sure=size > 0.5 * np.pi))
-        elif NUMERICAL_RAD < swing < IDLE_RAD:
+        elif NUMERICAL_RAD < swing < MOVED_RAD:
             text = f"{name} moves by {np.rad2deg(swing):.2g} deg in all"
             causes = ("a surface that was left alone", "radians that the map takes for degrees")
             findings.append(Finding("surface-idle", (name,), text, causes))
@@ -189,7 +188,7 @@ def _surfaces(means: Mapping[str, Array]) -> list[Finding]:
     findings = []
     for surface, (rate, beside, expected, wrong) in SURFACES.items():
         needed = (surface, rate, beside[0])  # without the wind angle its moment is the surface's
-        if any(name not in means for name in needed) or np.ptp(means[surface]) < IDLE_RAD:
+        if any(name not in means for name in needed) or np.ptp(means[surface]) < MOVED_RAD:
             continue
         others = [means[k] for k in beside if k in means]
         left = np.gradient(means[rate], means["t_s"])
@@ -220,7 +219,7 @@ def _exchanged(means: Mapping[str, Array]) -> list[Finding]:
         for other in names[k + 1 :]:
             pair = (one, other)
             ahead = [_ahead(means, SURFACES[own][0], own, pair) for own in pair]
-            if all(deviations < -EXCHANGED_DEVIATIONS for deviations in ahead):
+            if all(deviations < -CERTAIN_SD for deviations in ahead):
                 text = f"{one} drives what {other} should, and {other} what {one} should"
                 causes = (f"two columns exchanged: {HINT}",)
                 found.append(Finding("surface-exchanged", pair, text, causes))
@@ -230,7 +229,7 @@ def _exchanged(means: Mapping[str, Array]) -> list[Finding]:
 def _ahead(means: Mapping[str, Array], rate: str, own: str, pair: tuple[str, str]) -> float:
     """Return by how many deviations a surface drives its rate more than the other one does."""
     other = pair[1] if own == pair[0] else pair[0]
-    if any(np.ptp(means[s]) < IDLE_RAD for s in pair):
+    if any(np.ptp(means[s]) < MOVED_RAD for s in pair):
         return 0.0
     beside = [means[s] for s in ("alpha_rad", "beta_rad", *RATES) if s in means]
     left = np.gradient(means[rate], means["t_s"])

@@ -8,13 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.constants import CARE_SHARE, NORMAL_95
+from host.constants import CARE_SHARE, NORMAL_95, SMALL_SHARE
 from host.instrument.error_sources import ErrorSource
 from host.sysid.coefficients.deletion_diagnostics import CrossValidation
 from host.sysid.numerics.maneuver_agreement import ManeuverAgreement
 
 METHOD = "equation error with instrument errors"
-SMALL_SHARE = 0.05  # of the largest contribution in its equation
 
 
 @dataclass(frozen=True, slots=True)

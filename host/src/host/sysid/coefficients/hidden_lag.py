@@ -16,6 +16,7 @@ import numpy as np
 from scipy import special
 
 from host.arrays import Array
+from host.constants import SIGNIFICANCE
 from host.sysid.coefficients.coefficient_fit import Derivative
 from host.sysid.coefficients.coefficient_intervals import SearchResult
 from host.sysid.coefficients.equation_blocks import EquationBlock
@@ -23,7 +24,6 @@ from host.sysid.coefficients.window_spectra import equation_weight, in_band
 
 MOMENTS = ("Cl", "Cm", "Cn")
 SURFACES = ("de", "da", "dr")
-SIGNIFICANCE = 0.01
 
 
 def lagging_moments(

@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from host.constants import POSTERIOR_PRIOR_RATIO
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
 from host.sysid.errors.one_step import one_step_of
 from host.sysid.errors.systematic_errors import is_template, retrimmed
@@ -23,7 +24,6 @@ from host.sysid.models.templates import Trim
 
 AIRSPEED, COLUMN = "airspeed_share", "airspeed_mps"
 STEP = 0.10  # of the airspeed: beyond it the estimate is not linear in its scale
-POSTERIOR_PRIOR_RATIO = 0.7  # below it the data tell the scale
 
 
 def airspeed_shift(

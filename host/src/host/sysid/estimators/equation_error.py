@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array, IntArray
+from host.constants import HUBER_LIMIT, MEDIAN_TO_SIGMA
 from host.errors import IdentificationError
 from host.sysid.estimators.regression import (
     NO_EXCITATION,
@@ -24,9 +25,6 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.coloured_residuals import coloured_score_covariance
 from host.sysid.numerics.information_inverse import covariance_from_information
-
-HUBER_LIMIT = 1.345  # 95 % efficiency on normal residuals (Huber 1981)
-MAD_TO_SIGMA = 1.4826
 
 
 def fit_equation_error(
@@ -183,7 +181,7 @@ def _equation_scales(
         own = [block for block in equations if block.equation == equation]
         residual = np.concatenate([block.residual(theta) for block in own])
         if robust:
-            value = MAD_TO_SIGMA * float(np.median(np.abs(residual)))
+            value = MEDIAN_TO_SIGMA * float(np.median(np.abs(residual)))
         else:
             active = len(own[0].columns) if dof else 0
             value = float(np.sqrt(residual @ residual / max(len(residual) - active, 1)))

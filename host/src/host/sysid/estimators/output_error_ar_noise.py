@@ -24,7 +24,13 @@ import numpy as np
 from host.arrays import Array, BoolArray
 from host.sysid.estimators.multistart import multistart
 from host.sysid.models.covariance_root import covariance_root
-from host.sysid.numerics.ar_noise import ArNoise, choose_order, fit_ar, lagged_moments
+from host.sysid.numerics.ar_noise import (
+    HIGHEST_ORDER,
+    ArNoise,
+    choose_order,
+    fit_ar,
+    lagged_moments,
+)
 from host.sysid.numerics.between_samples import left_between_samples
 from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
 from host.sysid.numerics.output_error import (
@@ -35,7 +41,6 @@ from host.sysid.numerics.output_error import (
 )
 from host.sysid.numerics.output_error_problem import OutputProblem
 
-HIGHEST_ORDER = 6
 REFITS = 4
 COEFFICIENT_CHANGE = 1e-3
 MOMENT_ROUNDS = 6

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from host.arrays import Array
-from host.constants import NORMAL_95
+from host.constants import ENTANGLED, NORMAL_95, POSTERIOR_PRIOR_RATIO
 from host.errors import IdentificationError
 from host.instrument.servo_prior import ServoPrior
 from host.sysid.estimators.servo_delay_profile import (
@@ -44,8 +44,6 @@ FINE_S = 0.01  # between the delays about the best, at first
 STEP_SHRINKS = 5.0
 SHORT_STEPS, LEAST_STEP_S = 4.0, 3e-3  # deviations of the delay that the parabola may span
 STILL = 1e-4  # of the motion of the surface: what moves it by less moves nothing
-POSTERIOR_PRIOR_RATIO = 0.7  # of the prior's deviation: below it the data say it
-COLLINEAR = 0.9  # correlation of a derivative with the servo: they cannot be separated
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +94,7 @@ class ServoEstimate:
     @property
     def alike(self) -> tuple[str, ...]:
         """Parameters that cannot be separated from the servo."""
-        return tuple(n for n, r in self.correlation.items() if r > COLLINEAR)
+        return tuple(n for n, r in self.correlation.items() if r > ENTANGLED)
 
     @property
     def wide_prior(self) -> bool:

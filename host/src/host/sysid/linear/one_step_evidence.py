@@ -16,13 +16,18 @@ import numpy as np
 from host.arrays import Array
 from host.sysid.estimators.gust_model import driven_model
 from host.sysid.estimators.innovations import driven_states
-from host.sysid.estimators.output_error_ar_noise import HIGHEST_ORDER
 from host.sysid.linear.linear_stages import LinearFit
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.residual_delays import advance_outputs
 from host.sysid.models.state_space_model import LinearModel, has_equations
-from host.sysid.numerics.ar_noise import ArNoise, choose_order, fit_ar, lagged_moments
+from host.sysid.numerics.ar_noise import (
+    HIGHEST_ORDER,
+    ArNoise,
+    choose_order,
+    fit_ar,
+    lagged_moments,
+)
 from host.sysid.numerics.model_problems import innovation_problem, output_problem
 
 FITTED_SHARE = 2.0 / 3.0  # of a maneuver, from its start

@@ -30,6 +30,8 @@ JOIN_S = 1.6  # between edges of one input; wider for a throttle pulse
 JOIN_THROTTLE_S = 3.0
 HOLD_S = 6.0  # longest step of an input
 SLOW = (0.007, 0.15)  # least swing of an input without edges: surfaces, throttle
+AWAY = 0.3  # of an input: a surface that is held further from its rest is not at rest
+OUT = 0.4  # of an input: the surface stands at one side
 WEAKER = 0.6  # of an input with edges: swings of the pilot beside it
 SHORT_S = 20.0  # a record no longer than this was cut to its input
 TURNING = 0.3  # of the rates behind an edge: before it an aircraft in trim turns less
@@ -211,7 +213,7 @@ def _join_held(
             rest = float(np.median(series[max(0, begin - 3 * lag) : max(1, begin - lag)]))
             away = np.abs(series[end : first - lag] - rest)
             size = float(np.max(np.abs(series[begin : last + 1] - rest)))
-            held = len(away) > 0 and bool(np.mean(away > 0.3 * size) > 0.9)
+            held = len(away) > 0 and bool(np.mean(away > AWAY * size) > 0.9)
             if held and t[first] - t[end] < HOLD_S:
                 joined[-1] = (begin, last)
                 continue
@@ -297,8 +299,8 @@ def _begins_inside(t: Array, series: Array, first: int, settle: float, rate: Arr
     away = series[: first + 1] - settle
     behind = series[first:] - settle
     size = max(float(np.max(np.abs(away))), float(np.max(np.abs(behind))))
-    held = bool(np.mean(np.abs(away) > 0.3 * size) > 0.7)
-    both = bool(np.min(behind * np.sign(away[0])) < -0.3 * size)
+    held = bool(np.mean(np.abs(away) > AWAY * size) > 0.7)
+    both = bool(np.min(behind * np.sign(away[0])) < -AWAY * size)
     short = float(t[-1] - t[0]) < SHORT_S
     return held and (both or short or _turns_already(away, rate, first, size))
 
@@ -307,7 +309,7 @@ def _turns_already(away: Array, rate: Array, first: int, size: float) -> bool:
     """Return whether an aircraft answers a held surface as it answers the edge that ends it."""
     held = round(0.8 * first)  # the edge itself aside
     before, after = rate[:held], rate[first : 2 * first + 1]
-    if held < FEWEST or np.ptp(np.quantile(away[:held], (0.05, 0.95))) > 0.3 * size:
+    if held < FEWEST or np.ptp(np.quantile(away[:held], (0.05, 0.95))) > AWAY * size:
         return False
     return bool(np.std(before) > TURNING * np.std(after) > 0.0)
 
@@ -326,7 +328,7 @@ def _slow_start(t: Array, series: Array, start: int, amplitude: float) -> int:
 
 def _runs(level: Array, t: Array) -> list[tuple[int, float]]:
     """Return (sign, duration) of successive stretches above half amplitude."""
-    sign = np.where(level > 0.4, 1, np.where(level < -0.4, -1, 0))
+    sign = np.where(level > OUT, 1, np.where(level < -OUT, -1, 0))
     runs: list[tuple[int, float]] = []
     start = 0
     for k in range(1, len(sign) + 1):

@@ -39,6 +39,7 @@ def grade(columns: Mapping[str, Array], item: DetectedManeuver) -> Grade:
     before = (t >= item.start_s - TRIM_S) & (t < item.start_s)
     after = (t > item.input_end_s + 0.3) & (t <= item.end_s)
     # Of the trim before: between slow rows, as a radio's, the motion itself turns.
+    # The second difference of white noise has six times its power: 1 + 4 + 1.
     still = before if before.sum() > 8 else inside
     noise = float(np.std(np.diff(response[still], n=2))) / np.sqrt(6.0) if still.sum() > 8 else 0.0
     power = float(np.std(response[inside])) if inside.any() else 0.0

@@ -12,6 +12,7 @@ from host.arrays import Array, IntArray
 from host.errors import IdentificationError
 from host.sysid.maneuvers.maneuver_detection import (
     AXES,
+    FEWEST,
     LEAD_S,
     DetectedManeuver,
     detect_maneuvers,
@@ -19,7 +20,6 @@ from host.sysid.maneuvers.maneuver_detection import (
 )
 
 SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad")
-FEWEST = 8  # samples, as a maneuver needs
 SHORTEST_STRETCH_S = 0.9  # two short periods of a trainer; 0.35 s put two derivatives under "trust"
 SHARED_S = 0.1  # windows that overlap by more are one
 MOVED_SHARE = 0.1  # of the motion in a stretch: a part with less of it is at rest

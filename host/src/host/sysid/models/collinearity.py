@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from host.constants import ENTANGLED
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
 
-CORRELATION_LIMIT = 0.9
 CONDITION_LIMIT = 1e5  # of the scaled information: more digits than any sensor has
 
 
@@ -42,7 +42,7 @@ def collinearity(result: FitResult, beside: Collection[str] = ()) -> Collinearit
     count = len(result.model.parameters)
     for i in range(len(estimated)):
         for j in range(i):
-            if estimated[i] < count and abs(correlation[i, j]) > CORRELATION_LIMIT:
+            if estimated[i] < count and abs(correlation[i, j]) > ENTANGLED:
                 pairs.append(
                     (
                         result.names[estimated[j]],

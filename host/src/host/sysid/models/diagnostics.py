@@ -9,15 +9,12 @@ import numpy as np
 from scipy import special
 
 from host.arrays import Array
-from host.constants import NORMAL_95
-from host.sysid.models.collinearity import CORRELATION_LIMIT
+from host.constants import ENTANGLED, NORMAL_95, SMALL_SHARE
 from host.sysid.models.covariance_root import covariance_root
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 
-# Of the largest contribution to its equation: below it errors are relative to this share.
-LEAST_CONTRIBUTION = 0.05
 RELATIVE_BOUND_LIMIT = 1.0  # standard error over the reference value: 100 %
 EVEN_ODDS = 0.5  # probability of a bound above the limit: more likely than not
 WEAK_PROBABILITY = 0.05  # the same: what a 95 % statement leaves
@@ -115,7 +112,7 @@ def reference_values(
     maneuvers: Sequence[Maneuver],
     theta: Array,
     *,
-    small_share: float = LEAST_CONTRIBUTION,
+    small_share: float = SMALL_SHARE,
 ) -> Array:
     """Return the value that each parameter's error is compared with.
 
@@ -277,7 +274,7 @@ def measured_columns(model: LinearModel) -> list[int]:
 
 
 def relative_bounds(
-    result: FitResult, maneuvers: Sequence[Maneuver], *, small_share: float = LEAST_CONTRIBUTION
+    result: FitResult, maneuvers: Sequence[Maneuver], *, small_share: float = SMALL_SHARE
 ) -> Array:
     """Return the relative Cramer-Rao bound: standard error over reference value, per parameter.
 
@@ -290,7 +287,7 @@ def relative_bounds(
 
 
 def bound_exceedance_probability(
-    result: FitResult, maneuvers: Sequence[Maneuver], *, small_share: float = LEAST_CONTRIBUTION
+    result: FitResult, maneuvers: Sequence[Maneuver], *, small_share: float = SMALL_SHARE
 ) -> tuple[Array, float]:
     """Return the probability that each bound exceeds 100 % of its value, and that any does.
 
@@ -313,7 +310,7 @@ def bound_exceedance_probability(
 
 
 def assess_identifiability(
-    result: FitResult, maneuvers: Sequence[Maneuver], *, small_share: float = LEAST_CONTRIBUTION
+    result: FitResult, maneuvers: Sequence[Maneuver], *, small_share: float = SMALL_SHARE
 ) -> Identifiability:
     """Assess practical identifiability: grade every parameter whose bound may exceed its value.
 
@@ -347,7 +344,7 @@ def _identifiability_flag(
     reason = f"{STANDARD_ERROR} {100.0 * relative:.0f} % of its value"
     if (relative > RELATIVE_BOUND_LIMIT) != (probability > EVEN_ODDS):
         reason += f", and above 100 % with a probability of {probability:.2f}"
-    if correlation[partner] > CORRELATION_LIMIT:
+    if correlation[partner] > ENTANGLED:
         reason += f"; its correlation with {result.names[partner]} is {correlation[partner]:.3f}"
     else:
         reason += "; the input excites it too little for this noise"

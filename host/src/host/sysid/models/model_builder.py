@@ -16,6 +16,8 @@ from host.sysid.models.state_space_model import (
     Term,
 )
 
+LIMIT_SD = 3.0  # deviations: the search of a place goes as far from the assumed one
+
 
 @dataclass(slots=True)
 class ModelBuilder:
@@ -70,7 +72,7 @@ class ModelBuilder:
         """Add an accelerometer's offset from its assumed place, with a prior."""
         if sd_m > 0.0 and output in self.outputs and state in self.states:
             self.parameters[name] = Parameter(
-                name, 0.0, lower=-3.0 * sd_m, upper=3.0 * sd_m, prior_sd=sd_m
+                name, 0.0, lower=-LIMIT_SD * sd_m, upper=LIMIT_SD * sd_m, prior_sd=sd_m
             )
             self.accelerometer_offsets.append(AccelerometerOffset(output, state, name, gain))
 

@@ -16,6 +16,7 @@ from host.arrays import Array
 
 POLE_LIMIT = 0.999  # radius: nearer to one, 2000 samples cannot separate noise from drift
 MOST_REFLECTED = 1.0 - 1e-9  # reflection coefficient: of a stable process rounding makes it one
+HIGHEST_ORDER = 6  # of a noise model
 SHRINKING, MOST_SHRINKINGS = 0.995, 200  # of the radius of poles
 
 

@@ -16,7 +16,7 @@ from host.arrays import Array
 from host.errors import IdentificationError
 
 POLYNOMIAL = 3
-SMALLEST_WINDOW = 5
+SMALLEST_WINDOW = POLYNOMIAL + 2  # odd, and more samples than coefficients
 HEADROOM = 1.5  # bandwidth over the highest frequency at which a signal exceeds its noise
 SIGNAL_TO_FLOOR = 6.0  # power of a signal over the noise floor
 RESPONSE_LINES = 8192  # of a window's frequency response, to pi per sample

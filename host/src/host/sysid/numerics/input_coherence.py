@@ -27,7 +27,8 @@ import numpy as np
 from scipy import special
 
 from host.arrays import Array, BoolArray
-from host.sysid.numerics.ar_noise import ArNoise
+from host.constants import SIGNIFICANCE
+from host.sysid.numerics.ar_noise import HIGHEST_ORDER, ArNoise
 from host.sysid.numerics.information_inverse import (
     covariance_from_information,
 )
@@ -47,9 +48,7 @@ from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.response import Response
 from host.sysid.numerics.signature_test import SignatureTest, WhitenedOutput, signature_test
 
-SIGNIFICANCE = 0.01  # from here on the model is said to lack something
 SUSPICION = 0.10  # from here on intervals count that it may
-HIGHEST_ORDER = 6
 ROUNDS_WITHOUT, ROUNDS_BESIDE = 2, 3  # of the noise models: first without the added columns
 # Means over this long are tested: of quicker samples an AR model of low order cannot tell slow
 # gusts beside a sensor's white noise.

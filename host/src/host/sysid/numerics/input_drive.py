@@ -14,7 +14,7 @@ from host.sysid.numerics.information_inverse import (
     identified_inverse,
 )
 
-FEWEST_FREEDOM = 30.0  # of the noise along a column, for a test
+FEWEST_FREEDOM = 30.0  # of the noise along a column or a signature, for a test
 RANK = 1e-9  # of the largest eigenvalue of the scaled columns: less is rounding
 
 

@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import special
 
+from host.constants import SIGNIFICANCE
 from host.sysid.models.uncertainty import ModelError, Uncertainty
 
 if TYPE_CHECKING:
     from host.arrays import Array
 
-SIGNIFICANCE = 0.01
 MIN_EFFECTIVE_MANEUVERS = 1.5  # effective number that inform a parameter, for a test
 
 

@@ -17,11 +17,11 @@ from scipy import special
 from host.arrays import Array
 from host.sysid.numerics.ar_noise import ArNoise
 from host.sysid.numerics.information_inverse import identified_inverse
+from host.sysid.numerics.input_drive import FEWEST_FREEDOM
 from host.sysid.numerics.shared_noise import shared_noise_covariance
 
 TAKEN = 1e-4  # of a signature's power that the parameters leave: with less they are the same
 SAME = 1e-3  # of the largest eigenvalue of their correlation: less tells no two apart
-FEWEST_FREEDOM = 30.0  # of the noise along a signature, for a test
 LEAST = 0.1  # of a score's variance in independent noise: what two outputs may take off it
 SHOWS = 0.2  # of a signature's information: an output with more shows the error
 

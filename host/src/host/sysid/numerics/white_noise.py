@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.arrays import Array
+from host.constants import MEDIAN_TO_SIGMA
 
 if TYPE_CHECKING:
     from host.sysid.models.maneuver import Maneuver
 
-MEDIAN_TO_SIGMA = 1.4826  # of a normal distribution
-THIRD_DIFFERENCE_POWER = 20.0  # over that of white noise
+THIRD_DIFFERENCE_POWER = 20.0  # over that of white noise: 1 + 9 + 9 + 1
 
 
 def white_deviation(records: Sequence[Array]) -> Array:

@@ -11,15 +11,15 @@ import numpy as np
 from scipy import special
 
 from host.arrays import Array, BoolArray
+from host.constants import SIGNIFICANCE
 from host.sysid.estimators.coherence_inflation import NoiseExcess
 from host.sysid.estimators.gust_model import driven_model
 from host.sysid.estimators.innovations import driven_states
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.ar_noise import ArNoise, fit_ar, lagged_moments
+from host.sysid.numerics.ar_noise import HIGHEST_ORDER, ArNoise, fit_ar, lagged_moments
 from host.sysid.numerics.input_coherence import (
-    HIGHEST_ORDER,
     block_length,
     block_means,
 )
@@ -29,7 +29,6 @@ from host.sysid.numerics.response import Response
 from host.sysid.numerics.score_variance import variance_ratio
 from host.sysid.validation.free_simulation import FreeResponses, weighted_fit
 
-SIGNIFICANCE = 0.01
 DRAWS, DRAW_SEED = 100, 2
 AR_DRAWS = 12  # of them give the AR model of what is predicted
 

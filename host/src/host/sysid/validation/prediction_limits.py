@@ -29,6 +29,7 @@ from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.uncertainty import Uncertainty
 from host.sysid.numerics.ar_noise import ArNoise, autocovariance
 from host.sysid.numerics.input_coherence import InputCoherence, block_length, block_means
+from host.sysid.numerics.score_variance import LONGEST_LAG
 from host.sysid.validation.free_simulation import free_responses, weighted_fit
 from host.sysid.validation.noise_model_limits import (
     DRAWS,
@@ -40,8 +41,6 @@ from host.sysid.validation.noise_model_limits import (
 
 FAILS = 0.5  # NRMSE of an output: a quarter of its variance is not explained
 DRAW_SEED = 1
-LONGEST_LAG = 200  # of an autocorrelation that counts, means
-SETTLING = 200  # means before a drawn AR series counts
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,11 +184,11 @@ def random_noise(
     rng: np.random.Generator, memory: ArNoise, variance: float, samples: int, draws: int
 ) -> Array:
     """Return stationary AR noise of an innovation variance, (samples, draws)."""
-    series = rng.standard_normal((SETTLING + samples, draws)) * np.sqrt(variance)
+    series = rng.standard_normal((LONGEST_LAG + samples, draws)) * np.sqrt(variance)
     for k in range(memory.order, len(series)):
         for lag, part in enumerate(memory.coefficient, start=1):
             series[k] += part * series[k - lag]
-    return np.asarray(series[SETTLING:])
+    return np.asarray(series[LONGEST_LAG:])
 
 
 def _slopes(model: LinearModel, result: FitResult, maneuver: Maneuver) -> Array | None:
