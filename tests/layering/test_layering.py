@@ -10,6 +10,7 @@ import ast
 import math
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -153,8 +154,7 @@ def import_breaches(root: Path) -> Iterator[str]:
     """Yield a line for every Python import that crosses the table."""
     for folder, forbidden in FORBIDDEN_IMPORTS.items():
         for path in _files(root / folder, {".py"}):
-            tree = ast.parse(path.read_text(encoding="utf-8"))
-            for number, module in _imports(tree, path):
+            for number, module in _imports(path):
                 if module.split(".")[0] in forbidden:
                     yield f"{path.relative_to(root)}:{number}: may not import {module}"
 
@@ -169,7 +169,7 @@ def floor_breaches(root: Path) -> Iterator[str]:
             # those that start programs.
             floor = floors.index(room) + 1 if room in floors else 0
             above = set(floors[floor:]) if room not in PROGRAMS else set()
-            for number, module in _imports(ast.parse(path.read_text(encoding="utf-8")), path):
+            for number, module in _imports(path):
                 rest = module.removeprefix(f"{package}.")
                 if rest != module and rest.split(".")[0] in above:
                     yield f"{path.relative_to(root)}:{number}: {room} may not import {module}"
@@ -179,7 +179,7 @@ def never_breaches(root: Path) -> Iterator[str]:
     """Yield a line for every import between rooms that never know each other."""
     for reader, hidden in HOST_NEVERS:
         for path in _files(root / "host" / "src" / Path(*reader.split(".")), {".py"}):
-            for number, module in _imports(ast.parse(path.read_text(encoding="utf-8")), path):
+            for number, module in _imports(path):
                 if module == hidden or module.startswith(f"{hidden}."):
                     yield f"{path.relative_to(root)}:{number}: {reader} may not import {module}"
 
@@ -211,7 +211,7 @@ def verb_breaches(root: Path) -> Iterator[str]:
             if size > VERB_BODY:
                 more = f"{size} lines of body, at most {VERB_BODY}: arguments and printing only"
                 yield f"{name}:{node.lineno}: {node.name} has {more}"
-        for number, module in _imports(tree, path):
+        for number, module in _imports(path):
             if module.split(".")[0] in COMPUTING:
                 yield f"{name}:{number}: a verb does no work: may not import {module}"
 
@@ -260,7 +260,7 @@ def inner_imports(root: Path) -> set[tuple[str, str]]:
         for path in _files(root / folder, {".py"}):
             if (root / SYSID) in path.parents or "host.sysid." not in path.read_text("utf-8"):
                 continue
-            for _, module in _imports(ast.parse(path.read_text(encoding="utf-8")), path):
+            for _, module in _imports(path):
                 inside = module.split(".")[2:4] if module.startswith("host.sysid.") else []
                 if len(inside) == 2 and (root / SYSID / inside[0] / f"{inside[1]}.py").is_file():
                     found.add((str(path.relative_to(root)), ".".join(inside)))
@@ -333,8 +333,17 @@ def _room(inside: Path) -> str:
     return inside.parts[0].removesuffix(".py")
 
 
-def _imports(tree: ast.Module, path: Path) -> Iterator[tuple[int, str]]:
-    """Yield line and module of every import: in functions, relative ones and those by name too."""
+def _imports(path: Path) -> tuple[tuple[int, str], ...]:
+    """Return line and module of every import: in functions, relative ones and those by name too."""
+    return _imports_in(path.read_text(encoding="utf-8"), path)
+
+
+@cache  # four rules ask for those of the package
+def _imports_in(text: str, path: Path) -> tuple[tuple[int, str], ...]:
+    return tuple(_found_imports(ast.parse(text), path))
+
+
+def _found_imports(tree: ast.Module, path: Path) -> Iterator[tuple[int, str]]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, name.name) for name in node.names)
