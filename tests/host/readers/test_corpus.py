@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 from host.cli import main
 
+from tests.campaign import every_nth
 from tests.host.readers.field_inputs import INPUTS
 
 pytestmark = pytest.mark.costs(30, "the first of them flies the virtual flight, which is kept")
@@ -126,7 +127,7 @@ def test_an_input_of_the_field(
         assert own["half_width"] >= 0.98 * other["half_width"], parameter
 
 
-@pytest.mark.parametrize("name", [AP, "tlog_two_flights.tlog", "micros_wrap.csv"])
+@pytest.mark.parametrize("name", every_nth(["tlog_two_flights.tlog", AP, "micros_wrap.csv"], 3))
 def test_a_report_of_an_input(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The others come to the same answer, on a page of the same making."""
     path, options = str(written(name)), RIGHT[name].options

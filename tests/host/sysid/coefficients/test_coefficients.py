@@ -55,6 +55,12 @@ def fitted(
     return fit_coefficients(kept, windows, frame, data, powerplant(NAME))
 
 
+@pytest.fixture(scope="module")
+def still(flight: VirtualFlight) -> CoefficientFit:
+    """Return the fit of that flight as it is."""
+    return fitted(flight, sensor_error_model(NAME))
+
+
 def flown(flight: VirtualFlight) -> tuple[dict[str, Array], list[Window]]:
     columns, _ = even_columns(flight.table)
     flying = columns["t_s"] > 8.0
@@ -81,9 +87,8 @@ def misses(flight: VirtualFlight, fit: CoefficientFit) -> dict[str, float]:
     return result
 
 
-def test_finds_the_truth_and_covers_it(flight: VirtualFlight) -> None:
-    fit = fitted(flight, sensor_error_model(NAME))
-    miss = misses(flight, fit)
+def test_finds_the_truth_and_covers_it(flight: VirtualFlight, still: CoefficientFit) -> None:
+    fit, miss = still, misses(flight, still)
     assert {k: v for k, v in miss.items() if k in WITHIN and abs(v) > WITHIN[k]} == {}
     for d in fit.derivatives:
         if d.name in WITHIN:
@@ -121,13 +126,15 @@ def test_a_vane_taken_for_frictionless_shows_in_damping(flight: VirtualFlight) -
     assert abs(miss["Cm_q"]) > 0.06
 
 
-def test_the_drawing_tells_the_arm_of_the_accelerometers_from_lift(flight: VirtualFlight) -> None:
+def test_the_drawing_tells_the_arm_of_the_accelerometers_from_lift(
+    flight: VirtualFlight, still: CoefficientFit
+) -> None:
     data, frame = sensor_error_model(NAME), airframe_data(NAME)
     unknown = replace(frame, elevator_arm_m=0.0, rudder_arm_m=0.0)
     wrong = replace(frame, elevator_arm_m=0.7 * frame.elevator_arm_m, arm_share=0.01)
     lift = {}
-    for name, own in (("told", frame), ("unknown", unknown), ("wrong", wrong)):
-        fit = fitted(flight, data, own)
+    fits = {"told": still, "unknown": fitted(flight, data, unknown)}
+    for name, fit in (fits | {"wrong": fitted(flight, data, wrong)}).items():
         lift[name] = next(d for d in fit.derivatives if d.name == "CL_de")
         assert np.all(np.linalg.eigvalsh(fit.covariance) > -1e-9)
     assert lift["unknown"].half_width > 0.18 * lift["unknown"].value
@@ -140,12 +147,10 @@ def test_the_drawing_tells_the_arm_of_the_accelerometers_from_lift(flight: Virtu
     [("alpha_rad", "alpha_scale"), ("beta_rad", "beta_scale"), ("p_radps", "gyro_x_scale")],
 )
 def test_an_error_shifts_the_derivatives_as_the_fit_says(
-    flight: VirtualFlight, column: str, error: str
+    flight: VirtualFlight, still: CoefficientFit, column: str, error: str
 ) -> None:
-    data = sensor_error_model(NAME)
-    still = fitted(flight, data)
     size = next(e.deviation for e in still.error_sources if e.name == error)
-    moved = fitted(flight, data, gains={column: 1.0 + size})
+    moved = fitted(flight, sensor_error_model(NAME), gains={column: 1.0 + size})
     said = still.error_shifts[error]
     found = [b.value - a.value for a, b in zip(still.derivatives, moved.derivatives, strict=True)]
     own = np.array([d.half_width for d in still.derivatives]) / NORMAL_95

@@ -12,6 +12,7 @@ from host.sysid import fit
 from studies.data import with_rates
 from studies.navion import navion_free
 
+from tests.campaign import every_nth
 from tests.host.short_period_table import identified, short_period_table
 
 
@@ -31,7 +32,7 @@ def test_how_recursive_settles_is_written(table: Path, tmp_path: Path, method: s
     assert error.iloc[-1] < max(0.5 * error.max(), 0.5)  # of 80: the first may be right already
 
 
-@pytest.mark.parametrize("forgetting", [0.99, 0.98])
+@pytest.mark.parametrize("forgetting", every_nth([0.98, 0.99], 2))
 def test_intervals_are_those_of_what_was_not_forgotten(forgetting: float) -> None:
     """Over sixty draws of noise the half-width is twice the scatter (a tenth of it before)."""
     model = navion_free()
