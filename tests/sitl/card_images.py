@@ -35,7 +35,8 @@ from tests.cards.tally import Result, Tally  # noqa: E402
 from tests.sitl.card_flight import fly  # noqa: E402
 
 LIBRARY = ROOT / "build" / "sitl-sanitized" / "libsitl.so"
-SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+# -O1: with -O2 compiling takes half as long again, and flights take as long.
+SANITIZERS = ("-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 HUNG_CPU_S = 60  # of a flight that takes a fraction of a second
 
 
