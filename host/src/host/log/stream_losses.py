@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from host.log.ledger import Ledger, Loss
+from host.physical.sampling import GAP_FACTOR
 from host.physical.session import Session
 from host.wire.framing import HEAD_BYTES, TAIL_BYTES
 from host.wire.store import FrameStore
 from host.wire.stream import Stream
 
-_LATE = 1.5  # of the usual time between two frames
 _LISTED = 1000  # ranges of one cause listed one by one; the rest is one record
 
 
@@ -76,7 +76,7 @@ def _holes(session: Session) -> Iterator[_Hole]:
         step = np.diff(t_us)
         usual_us = float(np.median(step))
         place = session.store.blocks.position[part.block]
-        for at in np.flatnonzero(step > _LATE * usual_us).tolist():
+        for at in np.flatnonzero(step > GAP_FACTOR * usual_us).tolist():
             yield _Hole(
                 int(place[at]),
                 int(place[at + 1]),

@@ -193,7 +193,7 @@ def even_grid(
         if covered < 0.5:
             notes.append(f"{name}: {100.0 * (1.0 - covered):.0f} % missing, not used")
             continue
-        if steps.get(name, 0.0) > 1.5 * dt_s:
+        if steps.get(name, 0.0) > GAP_FACTOR * dt_s:
             slower.append(f"{name} {steps[name]:.3g} s")
         series = values[np.isfinite(values)]
         if name in ANGLES:
@@ -201,7 +201,7 @@ def even_grid(
         result[name] = np.interp(grid, own.t, series)
         if own.step_s * 1e6 > SLOW_US and name in FITTED:
             result[name] += _bent(grid, own, series)
-        if steps.get(name, 0.0) > 1.5 * dt_s:
+        if steps.get(name, 0.0) > GAP_FACTOR * dt_s:
             result[sampled_name(name)] = _at_instants(grid, own.t)
         if name in fitted and len(own.t) < len(rows.t):
             bridged |= _over(grid, own)

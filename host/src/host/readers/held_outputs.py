@@ -12,12 +12,12 @@ from __future__ import annotations
 import numpy as np
 
 from host.arrays import Array, IntArray
+from host.readers.even_grid import LONGEST_GAP_S
 from host.readers.signals import Signal
 
 STEP_S = 0.005  # step of rows that repeat a held value: a fortieth of a 5 Hz short period
 DENSE_HZ = 100.0  # an output logged at this rate or more is not interpolated
 UNEVEN = 0.2  # unevenness of four records, as a share of their span, above which one is missing
-LONGEST_HOLD_S = 0.25  # an output is unknown later than this after its last record
 
 
 def held_output(signal: Signal, period_s: float) -> tuple[Array, Array]:
@@ -41,7 +41,7 @@ def held_output(signal: Signal, period_s: float) -> tuple[Array, Array]:
     share = np.clip((rows - t[before]) / np.maximum(length_s, 1e-9), 0.0, 1.0)
     at_pulse = np.floor(share * pulses + 1e-6) / pulses
     out = _between(t, values, before, at_pulse)
-    out[length_s > max(LONGEST_HOLD_S, 3.0 * usual_s)] = np.nan
+    out[length_s > max(LONGEST_GAP_S, 3.0 * usual_s)] = np.nan
     return rows, np.asarray(out)
 
 

@@ -42,6 +42,7 @@ def _unscented_pass(
     mean_weight = np.full(2 * size + 1, 0.5 / scale)
     mean_weight[0] = 1.0 - size / scale
     weight = mean_weight.copy()
+    # 1 - alpha^2 + beta, beta = 2 of a normal law (Wan & van der Merwe, 2000).
     weight[0] += 3.0 - SIGMA_POINT_SPREAD**2
     e, white = np.zeros_like(maneuver.outputs), np.zeros_like(maneuver.outputs)
     next_inputs = np.vstack([maneuver.inputs[1:], maneuver.inputs[-1:]])

@@ -18,14 +18,13 @@ from scipy.special import chdtrc, chdtri
 
 from host.arrays import Array
 from host.constants import CERTAIN_SD
-from host.sysid.checks.identity_factors import LARGEST_FACTOR, Identity
+from host.sysid.checks.identity_factors import LARGEST_FACTOR, RIGHT_SHARE, Identity
 from host.sysid.numerics.first_order_filter import first_order_filter
 
 PAST_STEPS = 6  # of what is left, that tell the next
 LAGS_STEPS = (0.0, 1.5, 4.0, 10.0, 30.0, 100.0)  # of first order, behind a surface
 ROWS_EACH = 8  # for each number that is fitted: with fewer it explains gusts too
-SENSOR_SHARE, SENSOR_DELAY_S = 0.1, 0.03  # scale, delay and place of right sensors, one deviation
-UNKNOWN_SHARE = 0.1  # of a motion, that they make of it in other ways
+SENSOR_DELAY_S = 0.03  # of right sensors, one deviation
 REPEATS = 1e-10  # of the largest on a triangle's diagonal: the past may repeat itself
 SHORTEST_S = 19.0  # of 20 with its ends: a trend of a shorter record is explained by chance
 CERTAIN = CERTAIN_SD**2  # of a chi-square of one unknown
@@ -108,10 +107,10 @@ class DrivenTest:
         weights, squares = _whitening(left.rest + more * added.rest)
         free = len(self._own) - PAST_STEPS - self._own.shape[1] - self.instruments
         variance = squares / free
-        variance += UNKNOWN_SHARE**2 * np.mean((weights @ self.rate.along.T) ** 2, axis=1)
+        variance += RIGHT_SHARE**2 * np.mean((weights @ self.rate.along.T) ** 2, axis=1)
         unscaled = [part for name, part in self.parts.items() if name != scaled]
         unscaled += [] if scaled else [self.rate]
-        errors = [SENSOR_SHARE * one.along for one in unscaled]
+        errors = [RIGHT_SHARE * one.along for one in unscaled]
         errors += [*self._errors, *self._delayed]
         error = weights @ np.stack(errors).transpose(0, 2, 1)  # (errors, factors, instruments)
         covariance = np.einsum("efi,efj->fij", error, error)

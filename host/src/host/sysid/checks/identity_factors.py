@@ -16,7 +16,7 @@ from host.constants import CERTAIN_SD
 
 SIGN_CORRELATION, FACTOR_CORRELATION = 0.5, 0.25  # partial: less tells nothing of either
 LARGEST_FACTOR = 1.5
-RIGHT_SHARE = 0.1  # of a motion, that scales of right sensors make of it
+RIGHT_SHARE = 0.1  # of a motion, that right sensors make of it by scale, or otherwise
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2, STEEPEST_SINE
+from host.physical.sampling import GAP_FACTOR
 from host.sysid.checks.identity_factors import Identity, correlation, factors, may_be_one, without
 
 ANGLE_EXPLAINED = 0.3  # of an angle's rate that the gyro explains: less is another signal
@@ -210,7 +211,8 @@ def _law(
 ) -> Identity:
     """Return the identity over each step: a difference on the left, an integral on the right."""
     step_s = np.diff(m["t_s"])
-    even = step_s < 1.5 * float(np.median(step_s))  # between two stretches of flight is a jump
+    # Between two stretches of flight is a jump.
+    even = step_s < GAP_FACTOR * float(np.median(step_s))
     even = even[:-2] & even[1:-1] & even[2:]
 
     def over(x: Array) -> Array:

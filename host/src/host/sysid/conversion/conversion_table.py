@@ -31,13 +31,13 @@ from host.sysid.conversion.derivative_conversion import (
     to_coefficients,
     to_derivatives,
 )
+from host.sysid.models.consider_covariance import DOMINANT_SHARE
 from host.sysid.models.model_file import read_model, read_trim
 from host.sysid.models.parameter_units import parameter_unit
 from host.sysid.models.templates import Trim, template
 from host.sysid.models.toml_document import read_document
 
 STANDARD_KGPM3 = 1.225  # of the standard atmosphere at sea level
-NAMED_SHARE = 0.25  # of the variance: a smaller part is not worth naming
 OTHER = dict(zip(DERIVATIVES, COEFFICIENTS, strict=True))
 OTHER |= {coefficient: derivative for derivative, coefficient in OTHER.items()}
 AXES = ("longitudinal", "lateral")
@@ -90,7 +90,7 @@ class Conversion:
             part = self.found.covariance[k, j] ** 2 / max(self.found.covariance[j, j], 1e-300)
             shares[error] = part / max(own, 1e-300)
         cause = max(shares, key=shares.__getitem__)
-        return error_label(cause) if shares[cause] >= NAMED_SHARE else ""
+        return error_label(cause) if shares[cause] >= DOMINANT_SHARE else ""
 
 
 def convert(path: Path, aircraft: str, at: FlightCondition) -> Conversion:

@@ -18,7 +18,7 @@ from host.arrays import Array, BoolArray, IntArray
 from host.sysid.maneuvers.free_response import with_free_response
 from host.sysid.maneuvers.logged_inputs import logged_inputs, without_held
 from host.sysid.maneuvers.overlapping_inputs import SUSTAINED, bounded, without_echoes
-from host.sysid.maneuvers.sustained_inputs import sustained_inputs
+from host.sysid.maneuvers.sustained_inputs import QUIET, sustained_inputs
 
 LAG_S = 0.12  # a hand needs about this long for one edge
 LEAST_EDGE_RAD = 0.025  # 1.4 degrees: a pulse smaller than this excites nothing on a trainer
@@ -192,7 +192,7 @@ def _edges(
     change[lag:] = series[lag:] - series[:-lag]
     change[~flying] = 0.0
     # A low quantile, because a sweep can fill most of a record; of a normal one it is 0.253 sigma.
-    quiet = float(np.quantile(np.abs(change[flying]), 0.2)) / 0.253 if flying.any() else 0.0
+    quiet = float(np.quantile(np.abs(change[flying]), QUIET)) / 0.253 if flying.any() else 0.0
     least = LEAST_EDGE_THROTTLE if axis == "throttle" else LEAST_EDGE_RAD
     hot = np.flatnonzero(np.abs(change) > max(least, ACTIVITY * quiet))
     if len(hot) == 0:

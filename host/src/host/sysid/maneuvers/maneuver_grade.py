@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.maneuvers.maneuver_detection import RESPONSE_OF, TRIM_S, DetectedManeuver
+from host.sysid.maneuvers.maneuver_detection import FEWEST, RESPONSE_OF, TRIM_S, DetectedManeuver
+
+RESTLESS = 0.25  # of the response before it, or of the input after it: a surface that is not held
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +42,10 @@ def grade(columns: Mapping[str, Array], item: DetectedManeuver) -> Grade:
     after = (t > item.input_end_s + 0.3) & (t <= item.end_s)
     # Of the trim before: between slow rows, as a radio's, the motion itself turns.
     # The second difference of white noise has six times its power: 1 + 4 + 1.
-    still = before if before.sum() > 8 else inside
-    noise = float(np.std(np.diff(response[still], n=2))) / np.sqrt(6.0) if still.sum() > 8 else 0.0
+    still = before if before.sum() > FEWEST else inside
+    noise = (
+        float(np.std(np.diff(response[still], n=2))) / np.sqrt(6.0) if still.sum() > FEWEST else 0.0
+    )
     power = float(np.std(response[inside])) if inside.any() else 0.0
     ratio = power / max(noise, 1e-12)
     # Of a record that was cut to its input neither is known, and neither counts against it.
@@ -52,9 +56,9 @@ def grade(columns: Mapping[str, Array], item: DetectedManeuver) -> Grade:
     remarks = []
     if ratio < 5.0:
         remarks.append(f"response only {ratio:.1f} times its noise: fly a larger input")
-    if trim > 0.25:
+    if trim > RESTLESS:
         remarks.append(f"not trimmed before: {100.0 * trim:.0f} % of the response")
-    if feedback > 0.25:
+    if feedback > RESTLESS:
         remarks.append(
             f"pilot corrects during the response ({100.0 * feedback:.0f} % of the input)"
         )
@@ -62,7 +66,7 @@ def grade(columns: Mapping[str, Array], item: DetectedManeuver) -> Grade:
         remarks.append("response cut short: wait before the next input")
     score = float(
         np.clip(ratio / 20.0, 0.0, 1.0)
-        * np.clip(1.25 - trim, 0.0, 1.0)
-        * np.clip(1.25 - feedback, 0.0, 1.0)
+        * np.clip(1.0 + RESTLESS - trim, 0.0, 1.0)
+        * np.clip(1.0 + RESTLESS - feedback, 0.0, 1.0)
     )
     return Grade(score, ratio, trim, feedback, tuple(remarks))

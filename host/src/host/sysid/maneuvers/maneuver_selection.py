@@ -21,9 +21,8 @@ from host.sysid.maneuvers.maneuver_detection import (
 
 SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad")
 SHORTEST_STRETCH_S = 0.9  # two short periods of a trainer; 0.35 s put two derivatives under "trust"
-SHARED_S = 0.1  # windows that overlap by more are one
 MOVED_SHARE = 0.1  # of the motion in a stretch: a part with less of it is at rest
-TOUCHING_S = 0.1  # nothing moved between windows no further apart
+TOUCHING_S = 0.1  # windows as far apart, or on each other, only touch
 HELD_OUT_FROM = 3  # maneuvers of an axis, of which one is held out
 TimeSpan = tuple[float | None, float | None]  # from and to, s; None is the end of the record
 
@@ -103,7 +102,7 @@ def overlap_notes(stretches: Sequence[TimeSpan]) -> list[str]:
         (-np.inf if first is None else first, np.inf if last is None else last)
         for first, last in stretches
     )
-    shared = [b for a, b in itertools.pairwise(spans) if b[0] < a[1] - SHARED_S]
+    shared = [b for a, b in itertools.pairwise(spans) if b[0] < a[1] - TOUCHING_S]
     if not shared:
         return []
     begins = ", ".join("the start" if first == -np.inf else f"{first:g} s" for first, _ in shared)
@@ -189,7 +188,7 @@ def _joined(
 
 
 def _overlapping(before: DetectedManeuver, item: DetectedManeuver) -> bool:
-    return item.start_s < before.fit_window()[1] - SHARED_S
+    return item.start_s < before.fit_window()[1] - TOUCHING_S
 
 
 def _touching(before: DetectedManeuver, item: DetectedManeuver) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 from host.arrays import Array, BoolArray
 
 HALF_S = 1.0  # of the window of a swing
+QUIET = 0.2  # quantile: the quietest fifth of a flight has no input
 ABOVE = 4.0  # swings of an input over those of the quiet fifth of the flight
 SMALL, LOW, LOW_SHARE = 0.2, 3.0, 0.5  # of its own swings, of quiet ones, of the least: it goes on
 CUT_S = 60.0  # a record no longer than this may have been cut to its input, and hardly have a rest
@@ -39,7 +40,7 @@ def sustained_inputs(
         return []
     swing = _swing(series, half)
     cut = flying.sum() * dt_s <= CUT_S
-    quiet, large = np.quantile(swing[flying], (0.05 if cut else 0.2, 0.95))
+    quiet, large = np.quantile(swing[flying], (0.05 if cut else QUIET, 0.95))
     if cut and large < NO_REST * quiet:
         quiet = 0.0
     active = flying & (swing > ABOVE * quiet) & (_swing(_smoothed(series, dt_s), half) > least)
