@@ -25,12 +25,16 @@ def flight_elf(request: pytest.FixtureRequest) -> Path:
 
 @pytest.fixture(scope="session")
 def recording(
-    flight_elf: Path, tmp_path_factory: pytest.TempPathFactory
+    tmp_path_factory: pytest.TempPathFactory,
 ) -> Iterator[tuple[FlightRig, CardJournal]]:
-    """A rig in flight with a journal of its card: for children made by in_fork only."""
-    from flight.faults.run import ready_rig
+    """A rig in flight with a journal of its card: for children made by in_fork only.
 
-    rig, journal = ready_rig(flight_elf, tmp_path_factory.mktemp("recording"))
+    Not of `flight_elf`: a case that names a compiler would have it flown anew for those behind.
+    """
+    from flight.faults.run import ready_rig
+    from flight.images import build_image
+
+    rig, journal = ready_rig(build_image("mega2560"), tmp_path_factory.mktemp("recording"))
     yield rig, journal
     rig.chip.close()
 
