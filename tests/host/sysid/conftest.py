@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
 
 import pytest
+from host.cli import main
 from host.instrument.instrument_errors import (
     InstrumentErrors,
     errors_without_file,
@@ -26,6 +29,23 @@ def known_sensors(maker: str, calibration: Calibration | None = None) -> Instrum
     errors = usual_errors(maker)
     kept = {e.name for e in errors if e.name.startswith("servo")} | OF_AIRSPEED
     return errors.scaled(0.01, *(e.name for e in errors if e.name not in kept))
+
+
+@pytest.fixture(scope="session")
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Path]:
+    """Return what gives the folder of a flight without recorder; nobody writes into it.
+
+    It is flown by the first of the modules that ask for it, each with the errors below.
+    """
+
+    @cache
+    def folder_of(card: str, seed: int) -> Path:
+        folder = tmp_path_factory.mktemp(f"{card}_{seed}_")
+        quiet = ["--firmware", "none", "--no-picture"]
+        assert main(["simulate", card, *quiet, "--seed", str(seed), "-o", str(folder)]) == 0
+        return folder
+
+    return folder_of
 
 
 @pytest.fixture(scope="module", autouse=True)

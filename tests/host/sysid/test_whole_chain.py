@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +23,9 @@ from host.sysid.reconstruction.position_correction import transfer_to_cg
 
 
 @pytest.fixture(scope="module")
-def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+def flown(simulated: Callable[[str, int], Path]) -> tuple[Path, dict[str, Any]]:
     """One simulated flight without a recorder, and its truth."""
-    folder = tmp_path_factory.mktemp("flown")
-    options = ["--seed", "3", "--firmware", "none", "--no-picture", "-o", str(folder)]
-    assert main(["simulate", "demo", *options]) == 0
+    folder = simulated("demo", 3)
     with (folder / "flight.truth.toml").open("rb") as file:
         return folder / "flight.csv", tomllib.load(file)
 

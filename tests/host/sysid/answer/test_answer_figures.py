@@ -1,5 +1,6 @@
 """What pictures are made of: outputs beside outputs, degrees, the largest and the emptiest."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -31,11 +32,8 @@ from tests.host.sysid.verdicts import verdict_of
 
 
 @pytest.fixture(scope="module")
-def columns(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Array]:
-    folder = tmp_path_factory.mktemp("pictures")
-    quiet = ["--firmware", "none", "--no-picture"]
-    assert main(["simulate", "calm", *quiet, "--seed", "4", "-o", str(folder)]) == 0
-    return read_columns(folder / "flight.csv")[0]
+def columns(simulated: Callable[[str, int], Path]) -> dict[str, Array]:
+    return read_columns(simulated("calm", 4) / "flight.csv")[0]
 
 
 # Residuals of these are of rates, of spectra and of one step: as many columns as rates, lines as

@@ -23,11 +23,8 @@ from tests.host.sysid.at_hand import identify
 
 
 @pytest.fixture(scope="module")
-def flight(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("files")
-    quiet = ["--firmware", "none", "--no-picture"]
-    assert main(["simulate", "calm", *quiet, "--seed", "4", "-o", str(folder)]) == 0
-    return folder / "flight.csv"
+def flight(simulated: Callable[[str, int], Path]) -> Path:
+    return simulated("calm", 4) / "flight.csv"
 
 
 @pytest.fixture(scope="module")
@@ -245,11 +242,13 @@ def test_a_device_is_written_to_as_it_is(answers: list[Answer]) -> None:
     assert Path("/dev/full").exists()
 
 
-def test_json_has_one_document_and_no_nan(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_has_one_document_and_no_nan(
+    flight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     def refuse(token: str) -> None:
         raise AssertionError(token)
 
-    prior = flight.with_name("prior.toml")
+    prior = tmp_path / "prior.toml"
     prior.write_text("[coefficients]\nCm_alpha = -1.6\n")
     beside = ["--aircraft", "ultrastick25e", "--truth", str(flight.with_name("flight.truth.toml"))]
     assert main(["identify", str(flight), *QUICK, *beside, "--prior", str(prior), "--json"]) == 0

@@ -1,10 +1,10 @@
 """Every quick method on one flight: none stumbles, and the table fits the terminal."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from host.cli import main
 from host.sysid.answer.method_comparison import method_table
 from host.sysid.estimators import methods
 from host.sysid.flight import read_columns
@@ -19,13 +19,11 @@ SLOW = {"hopfield-line-search", "genetic", "unscented-kalman", "filter-error"}
 
 
 @pytest.fixture(scope="module")
-def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Answer]:
+def answers(simulated: Callable[[str, int], Path]) -> dict[str, Answer]:
     """Every quick method on one 3-2-1-1 in light turbulence."""
     compiled.prefer_machine_code()  # of many fits, as the studies
-    folder = tmp_path_factory.mktemp("demo")
-    options = ["--seed", "3", "--firmware", "none", "--no-picture", "-o", str(folder)]
-    assert main(["simulate", "demo", *options]) == 0
-    columns = {k: v[::2] for k, v in read_columns(Path(folder / "flight.csv"))[0].items()}
+    flown = read_columns(simulated("demo", 3) / "flight.csv")[0]
+    columns = {k: v[::2] for k, v in flown.items()}
     windows = select_maneuvers(columns, numbers=[1])
     found = {}
     for method in dict.fromkeys((*STAGED, *methods())):

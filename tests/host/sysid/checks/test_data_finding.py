@@ -1,6 +1,7 @@
 """Findings: what is wrong with a record ends no work, is said, and keeps its channel open."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +19,9 @@ Columns = dict[str, np.ndarray]
 
 
 @pytest.fixture(scope="module")
-def record(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+def record(simulated: Callable[[str, int], Path]) -> pd.DataFrame:
     """A flight in calm air as another logger's table: speed and forward force without noise."""
-    folder = tmp_path_factory.mktemp("calm")
-    options = ["--seed", "5", "--firmware", "none", "--no-picture", "-o", str(folder)]
-    assert main(["simulate", "calm", *options]) == 0
-    table = pd.read_csv(folder / "flight.csv")
+    table = pd.read_csv(simulated("calm", 5) / "flight.csv")
     table = table[table["t_s"] > 8.0].reset_index(drop=True)
     for _ in range(3):
         speed = table["airspeed_mps"].rolling(51, center=True, min_periods=1).mean()

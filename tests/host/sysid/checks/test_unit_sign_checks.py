@@ -3,10 +3,10 @@
 import itertools
 import re
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
-from host.cli import main
 from host.readers.column_map import UNITS
 from host.sysid.checks import CHECKS, Finding, checked, open_channels
 from host.sysid.checks.side_force import unlikely_factors
@@ -20,14 +20,11 @@ SHORT = ("t_s", "airspeed_mps", "alpha_rad", "q_radps", "elevator_rad")
 
 
 @pytest.fixture(scope="module")
-def flights(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Columns]:
+def flights(simulated: Callable[[str, int], Path]) -> dict[str, Columns]:
     """One flight in calm air and one in light turbulence, all tolerances of sensors drawn."""
     found = {}
     for card in ("calm", "demo"):
-        folder = tmp_path_factory.mktemp(card)
-        options = ["--seed", "5", "--firmware", "none", "--no-picture", "-o", str(folder)]
-        assert main(["simulate", card, *options]) == 0
-        found[card], notes = read_columns(folder / "flight.csv")
+        found[card], notes = read_columns(simulated(card, 5) / "flight.csv")
         assert notes == []
     return found
 

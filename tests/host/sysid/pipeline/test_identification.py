@@ -4,7 +4,7 @@ import json
 import pickle
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -36,15 +36,9 @@ def loose(table: object) -> Any:
 
 
 @pytest.fixture(scope="module")
-def flights(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+def flights(simulated: Callable[[str, int], Path]) -> tuple[Path, Path]:
     """Two flights of one card without a recorder, with what is true of each beside it."""
-    made = []
-    for seed in (3, 4):
-        folder = tmp_path_factory.mktemp(f"seed{seed}")
-        options = ["--seed", str(seed), "--firmware", "none", "--no-picture", "-o", str(folder)]
-        assert main(["simulate", "demo", *options]) == 0
-        made.append(folder)
-    return made[0], made[1]
+    return simulated("demo", 3), simulated("demo", 4)
 
 
 @pytest.fixture(scope="module")
