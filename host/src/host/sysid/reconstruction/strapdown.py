@@ -200,7 +200,7 @@ def rotation_from_vector(vector: Array) -> Array:
 def rotation_slope(vector: Array) -> Array:
     """Return the small rotation, earth axes, by which a change of a rotation vector turns further.
 
-    The left Jacobian (3, 3) of Barfoot, State Estimation for Robotics, eq. 7.77. It is the unit
+    The left Jacobian (3, 3) of Barfoot, State Estimation for Robotics, (7.77). It is the unit
     matrix only where nothing is turned yet.
     """
     angle = float(np.linalg.norm(vector))
