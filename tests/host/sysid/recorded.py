@@ -12,7 +12,8 @@ from host.twin.virtual import VirtualFlight, virtual_flight
 from tests.host.logs import ROOT
 
 NAME = "ultrastick25e"
-# Ten test points with a single turn, in light turbulence.
+# Ten test points with a single turn, in light turbulence: turns tell the beta vane's slope and load
+# servos, which two tests of an instrument leave out.
 STRAIGHT_ON = str(ROOT / "tests" / "data" / "straight_on.toml")
 Columns = dict[str, np.ndarray]
 

@@ -28,7 +28,7 @@ from host.sysid.reconstruction.reconstruction import (
 from studies.foreign.flight import Air
 from studies.independent import answer_with_file
 
-from tests.host.sysid.recorded import NAME, STRAIGHT_ON, flown, reconstructed
+from tests.host.sysid.recorded import NAME, flown, reconstructed
 
 NAMES = tuple(name for own in OBSERVABLE_GROUPS.values() for name in own)
 PRIOR = prior(None)
@@ -103,7 +103,7 @@ def test_where_no_error_alone_is_too_large_all_count_as_large() -> None:
 
 def test_an_error_that_a_flight_shows_counts_that_large_and_forbids_nothing() -> None:
     """A file claims a fifth of the errors. Without a file nobody claimed anything."""
-    _, columns = flown(STRAIGHT_ON, 901)
+    _, columns = flown("demo", 901)
     known, zeros = aircraft_data(NAME), "gyro_bias_radps"
     claimed = [name for name in OBSERVABLE_GROUPS if not name.startswith("pitot")]
     bold = replace(known, instrument=known.instrument.scaled(0.2, *claimed))
@@ -117,8 +117,8 @@ def test_an_error_that_a_flight_shows_counts_that_large_and_forbids_nothing() ->
 
 
 def test_a_recorded_flight_doubts_a_file_that_claims_a_fifth_and_no_honest_one() -> None:
-    _, columns = flown(STRAIGHT_ON, 901)
-    honest = reconstructed(STRAIGHT_ON, 901)
+    _, columns = flown("demo", 901)
+    honest = reconstructed("demo", 901)
     assert not honest.calibration_tests[0].rejected
     assert honest.calibration_tests[0].degrees_of_freedom > 8
     bold = reconstruct(columns, airframe_data(NAME), sensor_error_model(NAME).scaled(0.2))

@@ -169,8 +169,8 @@ def test_the_file_says_how_well_it_was_measured(tmp_path: Path) -> None:
 def test_our_own_log_tells_it_too() -> None:
     """Its columns begin when all sensors are there, a second before the launch."""
     record, columns, found = (
-        *recorded.flown(recorded.STRAIGHT_ON, 3),
-        recorded.reconstructed(recorded.STRAIGHT_ON, 3),
+        *recorded.flown("demo", 3),
+        recorded.reconstructed("demo", 3),
     )
     flight = record.record
     stands = float(true_table(flight, air_data(flight))["theta_rad"].iloc[50])

@@ -5,6 +5,11 @@ squares takes an aircraft that rides with slow gusts for vanes that under-read: 
 turbulence if residuals are taken as white, by 6 % if they are modelled as autoregressive. The
 sensitivities of air data are therefore replaced by their projection on the control surfaces, which
 are independent of gusts. AR models whiten the residuals.
+
+So many lags fit a part of the gusts, too: two-stage least squares leans to least squares by the
+share of instruments among the samples, 6 % here. As much of what the projection leaves is taken
+off again, so that gusts weigh nothing on average (Nagar, Econometrica 27, 1959, p. 575; Donald &
+Newey, Econometrica 69, 2001, p. 1161).
 """
 
 from __future__ import annotations
@@ -247,7 +252,10 @@ def _instruments(
     lagged_inputs: Sequence[Array],
     ar_model: ArNoise,
 ) -> list[Array]:
-    """Return the projection of whitened sensitivities on surfaces, slow drift and wind."""
+    """Return the projection of whitened sensitivities on surfaces, slow drift and wind.
+
+    Of its remainder K / (N - K) is taken off: K of N dimensions are projected on.
+    """
     common = len(problem.common)
     wind = [k for k, name in enumerate(problem.common) if name.startswith("wind_")]
     count = len(slopes)
@@ -263,9 +271,12 @@ def _instruments(
     size = np.sqrt(np.where(np.diag(products) > 0.0, np.diag(products), 1.0))
     scaled = products / size / size[:, None] + RIDGE * np.eye(len(size))
     inverse = np.linalg.inv(scaled) / size / size[:, None]
+    dimensions = float(np.sum(inverse * products))
+    fitted = dimensions / (sum(len(base) for base in bases) - dimensions)
     # Common unknowns are pooled over segments; initial values belong to one segment.
     pooled = sum(base.T @ slope[:, :common] for base, slope in zip(bases, slopes, strict=True))
-    return [
+    projected = [
         base @ (inverse @ np.hstack([pooled, base.T @ slope[:, common:]]))
         for base, slope in zip(bases, slopes, strict=True)
     ]
+    return [part - fitted * (slope - part) for part, slope in zip(projected, slopes, strict=True)]

@@ -304,9 +304,8 @@ def _beside_imu(
 def _known_better(estimate: tuple[float, float], by_file: tuple[float, float]) -> bool:
     """Return whether a file knows an error better than a flight, and the flight does not object.
 
-    Value and deviation of each. The gusts of two minutes pass for a part of the vanes' delay: the
-    lags of four surfaces are enough instruments to fit some of them. In light turbulence it came
-    out 1.7 ms too long, known to 1.5; the file knew it to 0.6, and Cm_q was 3 % small by that.
+    Value and deviation of each. In light turbulence a flight of two minutes tells the vanes' delay
+    to 1.5 ms, a file to 0.6; 1.7 ms too much made Cm_q 3 % small.
     """
     (value, sd), (nominal, by) = estimate, by_file
     agrees = abs(value - nominal) < CONTRADICTION_SD * np.hypot(sd, by)

@@ -23,7 +23,7 @@ FORCES = tuple(f"a{a}_mps2" for a in "xyz")
 # An error of density and dynamic pressure that leaves V squared as it is: nothing observes it.
 DENSITY = "density_share"
 INSTANTANEOUS_ERRORS = (*INERTIAL, *FLOW, *PITOT, DENSITY)  # without delays
-# The pitot's delay is not corrected: informed on six of twelve survey flights, 8 ms too long.
+# The pitot's delay is not corrected: even a survey flight tells it to 7 ms only.
 DELAYED_COLUMNS = {DELAYS[0]: AIR[1:]}
 CORRECTABLE = (*INSTANTANEOUS_ERRORS, *DELAYED_COLUMNS)
 LEAST_PRESSURE_SHARE = 0.1
