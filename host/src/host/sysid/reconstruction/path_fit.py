@@ -120,9 +120,7 @@ def _search(problem: PathProblem, lagged_inputs: Sequence[Array], patience: int)
         adapted_to = None
         if adapting:
             noise = _fit_ar_noises(problem, residuals)
-            # Least squares takes the slopes of each step: a tilt of the IMU and of every attitude
-            # leave so little of each other that slopes of another step stand across it.
-            adapted_to = lagged_inputs if lagged_inputs[0].shape[1] else None
+            adapted_to = lagged_inputs
         rows = _rows(problem, responses, residuals, noise, instruments, adapted_to)
         inverse, g = _solved(problem, theta, precision, rows)
         if converged or iteration == MOST_ITERATIONS + patience:
@@ -160,6 +158,8 @@ def _rows(
     """Return whitened residuals, instruments and sensitivities of every segment.
 
     `instruments` are those of the outputs of air data; made anew of inputs `adapted_to`, if given.
+    Without inputs it is least squares, by the slopes of each step: a tilt of the IMU and of every
+    attitude leave so little of each other that slopes of another step stand across it.
     """
     parts: list[tuple[list[Array], list[Array], list[Array]]] = [([], [], []) for _ in responses]
     for j, name in enumerate(problem.model.outputs):
@@ -167,7 +167,7 @@ def _rows(
         slope = [noise[j].whiten(r.sensitivities[j]) for r in responses]
         variance = float(np.sum(np.concatenate(white) ** 2)) / problem.counted(name)
         deviation = np.sqrt(max(variance, 1e-300))
-        if adapted_to is not None and name in AIR:
+        if adapted_to is not None and adapted_to[0].shape[1] and name in AIR:
             instruments[j] = _instruments(problem, slope, adapted_to, noise[j])
         for into, of_segment in zip(
             parts, zip(white, instruments.get(j, slope), slope, strict=True), strict=True
