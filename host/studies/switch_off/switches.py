@@ -275,8 +275,8 @@ SWITCHES = (
     ),
     _one(
         "drag polar",
-        "estimates the curvature of the drag polar along",
-        "errors.trim_departure:_curvature_sd",
+        "estimates the curvature of the drag polar, and drag by pitching, along",
+        "errors.trim_departure:_polar",
         gives({}),
     ),
     _one(

@@ -34,16 +34,20 @@ MEASURED = (
 # Of airspeed, whose noise would multiply every term: as long as the data allow. In calm air 0.1 s
 # left as much of it in N_dr as all other noise together.
 SMOOTH_S = (0.05, 0.1, 0.2, 0.4)
-# Second-order terms with a parameter of their own: name, row, factors. Drag is a parabola in lift;
-# dihedral, roll by yawing and yaw by rolling follow lift, so the angle of attack.
-SECOND_ORDER_TERMS: dict[str, tuple[tuple[str, str, str], ...]] = {
-    "longitudinal": (("D_alpha_alpha", "airspeed_mps", "alpha_rad"),),
+# What follows lift, with a parameter of its own: name, row, column, and whether by the angle of
+# attack. Drag is a parabola in lift, of which the template has not that of pitching; dihedral, roll
+# by yawing and yaw by rolling follow lift.
+LIFT_TERMS: dict[str, tuple[tuple[str, str, str, bool], ...]] = {
+    "longitudinal": (
+        ("D_alpha_alpha", "airspeed_mps", "alpha_rad", True),
+        ("D_q", "airspeed_mps", "q_radps", False),
+    ),
     "short-period": (),
     "lateral": (
-        ("L_beta_alpha", "p_radps", "beta_rad"),
-        ("L_r_alpha", "p_radps", "r_radps"),
-        ("N_beta_alpha", "r_radps", "beta_rad"),
-        ("N_p_alpha", "r_radps", "p_radps"),
+        ("L_beta_alpha", "p_radps", "beta_rad", True),
+        ("L_r_alpha", "p_radps", "r_radps", True),
+        ("N_beta_alpha", "r_radps", "beta_rad", True),
+        ("N_p_alpha", "r_radps", "p_radps", True),
     ),
     "dutch-roll": (),
     "roll": (),
@@ -90,10 +94,9 @@ class VaryingModel:
     thrust: tuple[LeftOutTerm, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.axis not in SECOND_ORDER_TERMS:
+        if self.axis not in LIFT_TERMS:
             raise IdentificationError(
-                f"departures of '{self.axis}', known are those of"
-                f" {' and '.join(SECOND_ORDER_TERMS)}"
+                f"departures of '{self.axis}', known are those of {' and '.join(LIFT_TERMS)}"
             )
 
     @property
@@ -120,7 +123,7 @@ class VaryingModel:
     def model(self) -> LinearModel:
         """The template with the departures as inputs, its own parameters first."""
         base, scaled = self.base, self.scaled
-        second_order, airspeed = SECOND_ORDER_TERMS[self.axis], AIRSPEED_TERMS[self.axis]
+        by_lift, airspeed = LIFT_TERMS[self.axis], AIRSPEED_TERMS[self.axis]
         n, m, p = len(base.states), len(base.inputs), len(base.outputs)
         terms = list(base.terms)
         for term in base.terms:
@@ -130,14 +133,14 @@ class VaryingModel:
                 place = m + scaled.index(key)
                 terms.append(Term(matrix, term.row, place, term.parameter, term.gain))
         rests = m + len(scaled) + n + len(self.forces)
-        beside = rests + len(second_order) + (len(airspeed) > 0)
+        beside = rests + len(by_lift) + (len(airspeed) > 0)
         size = beside + len(self.beside)
         B, D = np.zeros((n, size)), np.zeros((p, size))
         B[:, :m], D[:, :m] = base.B, base.D
         B[:, m + len(scaled) : m + len(scaled) + n] = np.eye(n)
         for k, force in enumerate(self.forces):
             D[base.outputs.index(force), m + len(scaled) + n + k] = 1.0
-        for k, (name, row, _) in enumerate(second_order):
+        for k, (name, row, _, _) in enumerate(by_lift):
             terms += acting_terms(base, self.trim, name, row, rests + k)
         for name, row in airspeed:
             terms += acting_terms(base, self.trim, name, row, beside - 1)
@@ -152,7 +155,8 @@ class VaryingModel:
             terms=tuple(terms),
             parameters=(
                 *base.parameters,
-                *(Parameter(name) for name, *_ in (*second_order, *airspeed)),
+                *(Parameter(name) for name, _, _, _ in by_lift),
+                *(Parameter(name) for name, _ in airspeed),
                 *(Parameter(t.name) for t in self.beside),
             ),
         )
@@ -164,7 +168,10 @@ class VaryingModel:
             *base.inputs,
             *(f"{column} by V^{power}" for column, power in self.scaled),
             *(f"rest of {name}" for name in (*base.states, *self.forces)),
-            *(f"{column} by alpha on {row}" for _, row, column in SECOND_ORDER_TERMS[self.axis]),
+            *(
+                f"{column} by alpha on {row}" if by_alpha else f"{column} on {row}"
+                for _, row, column, by_alpha in LIFT_TERMS[self.axis]
+            ),
             *(("airspeed over its trim",) if AIRSPEED_TERMS[self.axis] else ()),
             *(t.input_name for t in self.beside),
         )
@@ -203,8 +210,8 @@ class VaryingModel:
         inputs += [_deviation(rest) for rest in self._nonlinear_forces(columns, ratio)]
         angle = _deviation(columns["alpha_rad"])
         inputs += [
-            self._moving(_deviation(angle * _deviation(columns[column])))
-            for _, _, column in SECOND_ORDER_TERMS[self.axis]
+            self._moving(_deviation((angle if by_alpha else 1.0) * _deviation(columns[column])))
+            for _, _, column, by_alpha in LIFT_TERMS[self.axis]
         ]
         if AIRSPEED_TERMS[self.axis]:
             inputs.append(self._moving(ratio - 1.0))

@@ -6,10 +6,10 @@ lateral fit has N_p 39 %, N_da twofold and L_dr 53 % off by that. What the depar
 (`aerodynamics/varying_airspeed.py`), so the estimate is corrected by one Gauss-Newton step of its
 own method: N_p is then 0.5, N_da 11 and L_dr 5 % off.
 
-The drag polar is a parabola in lift; its curvature is estimated along. So is what a reduced
-template leaves out of the other lateral states (`aerodynamics/left_out_terms.py`). Filter error
-with the gust is fitted to what output error says is left without departures, and corrected by what
-that left.
+The drag polar is a parabola in lift; its curvature is estimated along, and drag by the lift of
+pitching. So is what a reduced template leaves out of the other lateral states
+(`aerodynamics/left_out_terms.py`). Filter error with the gust is fitted to what output error says
+is left without departures, and corrected by what that left.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
+from host.constants import EVEN_SD
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
 from host.sysid.aerodynamics.left_out_terms import (
     NEEDED,
@@ -31,7 +32,7 @@ from host.sysid.aerodynamics.left_out_terms import (
 from host.sysid.aerodynamics.path_thrust import rotor_means
 from host.sysid.aerodynamics.thrust_terms import thrust_terms
 from host.sysid.aerodynamics.unmeasured_motion import with_unmeasured
-from host.sysid.aerodynamics.varying_airspeed import MEASURED, SECOND_ORDER_TERMS, VaryingModel
+from host.sysid.aerodynamics.varying_airspeed import LIFT_TERMS, MEASURED, VaryingModel
 from host.sysid.errors.departure import Departure, expected_beside, with_second_order
 from host.sysid.errors.one_step import CERTAIN_SD, HALF_WAY, OneStep, Step, one_step_of
 from host.sysid.models.fit_result import FitResult
@@ -68,10 +69,10 @@ class _Departing:
         All columns of each, those that nobody measured guessed.
     beside : dict
         Terms that a template has not: what is expected, and one deviation.
-    expected : dict
+    thrust : dict
         What thrust is expected to do.
     polar : dict
-        One deviation of the curvature of the drag polar.
+        Of each term of the drag polar what is expected, and one deviation.
     """
 
     base: LinearModel
@@ -80,13 +81,18 @@ class _Departing:
     data: list[Maneuver]
     cuts: list[Mapping[str, Array]]
     beside: dict[str, tuple[float, float]]
-    expected: dict[str, float]
-    polar: dict[str, float]
+    thrust: dict[str, float]
+    polar: dict[str, tuple[float, float]]
 
     @property
     def along(self) -> dict[str, float]:
         """What is estimated along, and one deviation of each."""
-        return self.polar | {name: sd for name, (_, sd) in self.beside.items()}
+        return {name: sd for name, (_, sd) in (self.polar | self.beside).items()}
+
+    @property
+    def expected(self) -> dict[str, float]:
+        """What the drag polar and thrust are expected to do."""
+        return {name: mean for name, (mean, _) in self.polar.items()} | self.thrust
 
     @property
     def cause(self) -> str:
@@ -113,7 +119,7 @@ class _Departing:
             for name, value in zip(self.along, step.added, strict=True)
         }
         # What is fitted with thrust has the drag polar beside it.
-        polar = {name: (0.0, sd) for name, sd in self.polar.items()} if self.expected else {}
+        polar = self.polar if self.thrust else {}
         return Departure(
             step.shares, tuple(open_ones), self.varying, self.model(known),
             tuple(self.data), polar | self.beside,
@@ -203,7 +209,7 @@ def _departing(
         list(whole),
         beside,
         {t.name: beside[t.name][0] for t in thrust},
-        _curvature_sd(result, trim),
+        _polar(result, trim),
     )
 
 
@@ -261,7 +267,7 @@ def departures_measured(name: str, cuts: Sequence[Mapping[str, Array]]) -> bool:
         All columns of each maneuver.
     """
     needed = NEEDED.get(name, ("airspeed_mps",))
-    return name in SECOND_ORDER_TERMS and all(c in cut for cut in cuts for c in needed)
+    return name in LIFT_TERMS and all(c in cut for cut in cuts for c in needed)
 
 
 def _root(covariance: Array) -> Array:
@@ -270,18 +276,20 @@ def _root(covariance: Array) -> Array:
     return np.asarray((vector * np.sqrt(np.maximum(value, 0.0))).T)
 
 
-def _curvature_sd(result: FitResult, trim: Trim) -> dict[str, float]:
-    """Return which term of second order the data tell, and its prior deviation.
+def _polar(result: FitResult, trim: Trim) -> dict[str, tuple[float, float]]:
+    """Return what is expected of each term of the drag polar, and one deviation.
 
-    Left out, M_q was 1.8 % off in calm air, and the test of coherence named ax.
+    Left out, M_q was 1.8 % off in calm air, and the test of coherence named ax. Lift of pitching
+    drags by anything from nothing, where a tail makes it, to all that the polar has for it, evenly:
+    left out, CD_de was low by two to four half-widths where drag follows all lift.
     """
-    if "ax_mps2" not in result.model.outputs or "Z_alpha" not in result.names:
+    if "ax_mps2" not in result.model.outputs or "D_alpha" not in result.names:
         return {}
-    lift = trim.airspeed_mps * abs(result.value("Z_alpha"))
+    drag, lift, pitching = (result.value(name) for name in ("D_alpha", "Z_alpha", "Z_q"))
+    whole = drag * pitching / lift
     return {
-        name: LARGEST_CURVATURE * lift
-        for name, row, _ in SECOND_ORDER_TERMS[result.model.name]
-        if row == "airspeed_mps"
+        "D_alpha_alpha": (0.0, LARGEST_CURVATURE * trim.airspeed_mps * abs(lift)),
+        "D_q": (0.5 * whole, 0.5 * EVEN_SD * abs(whole)),
     }
 
 
