@@ -8,8 +8,13 @@ import numpy as np
 
 from host.arrays import Array, IntArray
 from host.sysid.checks.data_finding import Feedback, Finding
-from host.sysid.maneuvers.maneuver_detection import LEAD_S, STILL_RAD, DetectedManeuver, runs_of
-from host.sysid.maneuvers.maneuver_selection import FEWEST
+from host.sysid.maneuvers.maneuver_detection import (
+    FEWEST,
+    LEAD_S,
+    STILL_RAD,
+    DetectedManeuver,
+    runs_of,
+)
 from host.sysid.numerics.state_feedback import FeedbackLaw, feedback_law
 from host.sysid.numerics.white_noise import white_deviation
 

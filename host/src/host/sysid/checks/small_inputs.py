@@ -9,8 +9,13 @@ import numpy as np
 from host.arrays import Array, BoolArray
 from host.constants import DEG_PER_RAD
 from host.sysid.checks.data_finding import Finding
-from host.sysid.maneuvers.maneuver_detection import FLYING_SHARE, STILL_RAD, DetectedManeuver
-from host.sysid.maneuvers.maneuver_selection import FEWEST, SURFACES, select_maneuvers
+from host.sysid.maneuvers.maneuver_detection import (
+    FEWEST,
+    FLYING_SHARE,
+    STILL_RAD,
+    DetectedManeuver,
+)
+from host.sysid.maneuvers.maneuver_selection import SURFACES, select_maneuvers
 
 
 def whole_flight(columns: Mapping[str, Array]) -> tuple[list[DetectedManeuver], list[Finding]]:

@@ -10,7 +10,6 @@ from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.estimators.coherence_inflation import driven_by_inputs
 from host.sysid.estimators.output_error_ar_noise import (
-    HIGHEST_ORDER,
     ArNoiseFit,
     fit_with_ar_noise,
     refit_beside_inputs,
@@ -19,6 +18,7 @@ from host.sysid.estimators.start_values import start_values
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
+from host.sysid.numerics.ar_noise import HIGHEST_ORDER
 from host.sysid.numerics.coloured_residuals import coloured_score_covariance
 from host.sysid.numerics.maneuver_agreement import maneuver_influence
 from host.sysid.numerics.model_problems import output_problem
