@@ -104,7 +104,7 @@ def test_a_process_of_an_earlier_case_costs_a_later_one_nothing(tmp_path: Path) 
     text = (ROOT / "tests" / "conftest.py").read_text()
     (tmp_path / "conftest.py").write_text(text.replace("MOST_CPU_S = 10.0", "MOST_CPU_S = 0.2"))
     (tmp_path / "test_two.py").write_text(
-        "import os, subprocess, sys\n"
+        "import os, subprocess, sys, time\n"
         "BUSY = 'import time\\nwhile time.process_time() < 1.0: pass'\n"
         "LEFT = []\n"
         "def test_first():\n"
@@ -112,6 +112,7 @@ def test_a_process_of_an_earlier_case_costs_a_later_one_nothing(tmp_path: Path) 
         "    os.waitid(os.P_PID, LEFT[0].pid, os.WEXITED | os.WNOWAIT)  # ended, not waited for\n"
         "def test_second():\n"
         "    LEFT[0].wait()\n"
+        "    time.sleep(1.0)  # long enough to have used all of it\n"
     )
     command = (sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider")
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
