@@ -8,9 +8,8 @@ from host.aircraft.mass_properties import Condition, airframe_data
 from host.aircraft.powerplant import powerplant
 from host.constants import GRAVITY_MPS2
 from host.readers.even_grid import even_columns
-from host.sysid.aerodynamics import coefficient_parts, coefficients
-from host.sysid.aerodynamics.path_thrust import USUAL_DRAG, PathThrust, path_thrust
-from host.sysid.models import FitResult, Trim, free_model
+from host.sysid.aerodynamics.path_thrust import USUAL_DRAG, path_thrust
+from host.sysid.models import Trim
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
 
@@ -48,30 +47,6 @@ def test_without_a_known_propeller_thrust_is_what_drag_and_path_ask_for() -> Non
     assert found[0].along_n == pytest.approx(USUAL_DRAG * FORCE, rel=1e-6)
     assert found[1].along_n == pytest.approx(0.0, abs=1e-9)
     assert all(one.deviation_n > 0.3 * USUAL_DRAG * FORCE for one in found)
-
-
-def test_coefficients_are_without_it_and_count_what_is_open_of_it() -> None:
-    none, names = np.zeros((0, 0)), ("Z_alpha", "D_alpha")
-    own = {"Z_alpha": -FORCE * 4.0 / (AIRFRAME.mass_kg * 17.0), "D_alpha": -0.3}
-    unsure = PathThrust(0.04 * FORCE, 0.01 * FORCE, 0.02 * FORCE)
-    turned = unsure.in_derivatives(AIRFRAME.mass_kg, 17.0)
-    fit = FitResult(
-        "by hand", free_model("lift", ("q_radps",), ("de",)), names,
-        np.array([own[n] + turned[n] for n in names]), np.zeros((2, 2)), np.zeros((2, 2)),
-        np.full(2, 100.0), (), (), "simulation", none, 1, True,
-    )  # fmt: skip
-    exact = replace(AIRFRAME, mass_share=0.0)
-
-    def lift(thrust: PathThrust | None) -> tuple[float, float]:
-        parts = coefficient_parts(fit, exact, AT, thrust=thrust)
-        slope = next(c for c in coefficients(parts) if c.name == "CL_alpha")
-        return slope.value, slope.half_width
-
-    value, wide = lift(unsure)
-    _, narrow = lift(replace(unsure, deviation_n=0.0))
-    assert value == pytest.approx(4.0, rel=1e-9)
-    assert lift(None)[0] == pytest.approx(4.04, rel=1e-9)
-    assert np.sqrt(wide**2 - narrow**2) == pytest.approx(1.96 * 0.02, rel=1e-3)
 
 
 def test_the_lift_slope_of_a_powered_flight_is_that_of_the_aircraft() -> None:

@@ -4,7 +4,6 @@ import subprocess
 import sys
 import tempfile
 import tomllib
-from dataclasses import replace
 from itertools import starmap
 from pathlib import Path
 
@@ -12,23 +11,19 @@ import numpy as np
 import pytest
 from host.aircraft.airframe import Airframe
 from host.aircraft.file import load as load_aircraft
-from host.aircraft.file import read_document
 from host.aircraft.local_derivatives import coefficients, local_derivatives
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.cli import main
 from host.export import toml as tomlout
-from host.readers.even_grid import even_columns
 from host.sysid.aerodynamics import Coefficient, CoefficientTable
 from host.sysid.answer import read_truth, true_coefficients
 from host.sysid.answer.aircraft_export import AXES, CONTROLS, aircraft_document
 from host.sysid.coefficients.coefficient_fit import MeanCondition, ThrustEffect
 from host.sysid.flight import read_columns
-from host.twin.testcard.cards import load
-from host.twin.virtual import virtual_flight
 
-from tests.host.sysid.at_hand import identify, identify_coefficients
+from tests.host.sysid.at_hand import identify
 
 METHOD = "output-error-white"  # in calm air as good as the default, in a third of its time
 JSBSIM = """
@@ -98,35 +93,6 @@ def test_identifying_the_second_flight_gives_the_same_aircraft(saved: Path) -> N
         for c in answer.coefficients:
             if c.name in ("Cm_alpha", "Cm_de", "Cl_p", "Cn_beta", "Cn_dr"):
                 assert c.value == pytest.approx(expected[c.name], rel=0.25), c.name
-
-
-def test_coefficients_alone_are_saved_flown_and_found_again(saved: Path) -> None:
-    """The answer of a first flight is the truth of a second one."""
-    again, xml = saved / "coefficients.toml", saved / "coefficients.xml"
-    source = str(saved / "one/flight.csv")
-    flags = ["--aircraft", "ultrastick25e", "--model", "coefficients"]
-    flags += ["--save-aircraft", str(again), "--save-model", str(xml)]
-    assert main(["identify", source, *flags]) == 0
-    assert "<fdm_config" in xml.read_text()[:400]
-    table = read_document(again)["aerodynamics"]
-    assert isinstance(table, dict)
-    assert "+-" in table["sources"]["cm_q"]
-    assert "+-" in table["sources"]["cd_0"]
-    card = load("multisine")
-    own = replace(card, aircraft=str(again), sensors=replace(card.sensors, tolerances=False))
-    flight = virtual_flight(own, 11, chain="none")
-    columns, _ = even_columns(flight.table)
-    found = {c.name: c for c in identify_coefficients(columns, str(again)).coefficients}
-    missed = []
-    names = [(f"{axis}_{k}", f"{file}_{CONTROLS.get(k, k)}") for axis, file in AXES.items()
-             for k in ("alpha", "q", "beta", "p", "r", "de", "da", "dr")]  # fmt: skip
-    for name, key in names:
-        if key in table and table["sources"].get(key, "").startswith("identified"):
-            gap = abs(found[name].value - table[key][0])
-            missed += [name] if gap > found[name].half_width else []
-    assert len(missed) <= 2
-    # Intervals a quarter as wide would not hold: the bound means something.
-    assert abs(found["CD_0"].value - table["cd_0"]) <= 1.2 * found["CD_0"].half_width
 
 
 def test_bends_have_their_place_in_the_tables() -> None:

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.coefficients.equation_blocks import (
     EquationBlock,
@@ -64,48 +63,6 @@ def random_blocks(
     unknowns = Unknowns(POSITIONS, TERMS, windows * GUSTS, ERRORS)
     own = {"Cm": np.array([0.3, -0.2]), "w": np.zeros(0)}
     return blocks, unknowns, equation_blocks(blocks, sides[0], noise_free, own, unknowns, NOISE)
-
-
-def dense(parts: list[EquationBlock], count: int) -> tuple[Array, Array, Array]:
-    """Return the whole A, Z and y, lines of every block as unknowns behind the others."""
-    rows = sum(len(p.y) for p in parts)
-    width = count + sum(p.trend_basis.shape[1] for p in parts)
-    A, Z = np.zeros((rows, width)), np.zeros((rows, width))
-    at, line = 0, count
-    for p in parts:
-        here, lines = slice(at, at + len(p.y)), slice(line, line + p.trend_basis.shape[1])
-        A[here, p.unknown_indices], Z[here, p.unknown_indices] = p.A, p.Z
-        A[here, lines] = Z[here, lines] = p.trend_basis
-        at, line = here.stop, lines.stop
-    return A, Z, np.concatenate([p.y for p in parts])
-
-
-def test_sums_over_blocks_solve_the_whole_matrix() -> None:
-    _, unknowns, parts = random_blocks(5)
-    n, considered, sd = unknowns.count, np.array([unknowns.first_error]), np.array([0.1])
-    prior = np.diag(np.r_[np.zeros(TERMS), np.full(n - TERMS, 4.0)])
-    prior[considered, considered] = 1e30
-    gradient = np.r_[np.zeros(TERMS), np.full(n - TERMS, 0.2)]
-    found = solve_normal_equations(
-        accumulate(parts, n), Prior(prior, gradient), POSITION, considered, sd
-    )
-    A, Z, y = dense(parts, n)
-    known, right = np.zeros((A.shape[1],) * 2), Z.T @ y
-    known[:n, :n] = prior
-    right[:n] += gradient
-    scale = 1.0 / np.sqrt(np.abs(np.diag(Z.T @ A + known)))
-    both = np.outer(scale, scale)
-    inverse = np.linalg.inv((Z.T @ A + known) * both) * both
-    step = inverse @ right
-    sensitivity = -inverse @ (Z.T @ A[:, considered])
-    sensitivity[considered] = np.eye(1)
-    covariance = inverse @ (Z.T @ Z + known) @ inverse.T + (sensitivity * sd**2) @ sensitivity.T
-    np.testing.assert_allclose(found.step, step[:n], rtol=1e-8, atol=1e-12)
-    np.testing.assert_allclose(found.covariance, covariance[:n, :n], rtol=1e-7, atol=1e-10)
-    left = np.concatenate([p.residual_after(found.step) for p in parts])
-    np.testing.assert_allclose(left, y - A @ step, atol=1e-9)
-    # Every column that a block leaves out is nothing in it.
-    assert sum(p.A.shape[1] for p in parts) < 0.6 * len(parts) * n
 
 
 def test_trend_of_a_block_moves_nothing() -> None:

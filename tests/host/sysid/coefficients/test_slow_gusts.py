@@ -7,7 +7,7 @@ from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
-from host.sysid.coefficients import Window, WindowTransform, standard_model, window_transform
+from host.sysid.coefficients import Window, standard_model, window_transform
 from host.sysid.coefficients.aero_equations import FlightHistory, equations
 from host.sysid.coefficients.slow_gusts import (
     GUST_TERMS,
@@ -17,27 +17,12 @@ from host.sysid.coefficients.slow_gusts import (
     gust_strength,
 )
 from host.sysid.reconstruction import Record
-from numpy.polynomial import legendre
 
 NAME = "ultrastick25e"
 AIRSPEED_MPS, STEP_S = 20.0, 0.03
 SIGMA = {"u": 0.41, "w": 0.3}
 PLACE = {"u": 0, "w": 2}
-WINDOW_S = 23.0
 FORCES = ("CL", "CD")
-
-
-def windows(count: int, longitudinal: bool, gap_s: float = 1.0) -> list[WindowTransform]:
-    length, stride = round(WINDOW_S / STEP_S), round((WINDOW_S + gap_s) / STEP_S)
-    return [
-        window_transform(
-            np.arange(k * stride, k * stride + length),
-            STEP_S,
-            Window(0.0, 1.0, longitudinal),
-            FORCES,
-        )
-        for k in range(count)
-    ]
 
 
 @pytest.fixture(scope="module")
@@ -108,34 +93,6 @@ def test_fast_gusts_tell_how_strong_slow_ones_are(air: Array) -> None:
     found = gust_strength(noise, AIRSPEED_MPS, STEP_S)
     for gust, sigma in SIGMA.items():
         assert found[gust] == pytest.approx(sigma, rel=0.1), gust
-
-
-def test_statistics_of_the_shapes_are_those_of_the_twins_gusts(air: Array) -> None:
-    blocks = windows(2, longitudinal=False)
-    known = np.linalg.inv(gust_information(blocks, SIGMA, AIRSPEED_MPS, STEP_S))
-    last = int(blocks[1].samples[-1]) + 1
-    at = np.linspace(-1.0, 1.0, len(blocks[0].samples))
-    fitted = np.linalg.pinv(legendre.legvander(at, LEGENDRE_TERMS - 1))
-    flights = [air[k : k + last] for k in range(0, len(air) - last, last)]
-    factors = np.array(
-        [
-            np.concatenate(
-                [fitted @ f[b.samples, PLACE[g]] for b in blocks for _, _, g in GUST_TERMS["v"]]
-            )
-            for f in flights
-        ]
-    )
-    sampled = np.cov(factors.T)
-    assert len(flights) > 100
-    spread = np.sqrt(np.diag(sampled))
-    np.testing.assert_allclose(np.sqrt(np.diag(known)), spread, rtol=0.25)
-    # One gust goes through both windows: the slow one along is alike in them, vertical hardly.
-    likeness = known / np.sqrt(np.outer(np.diag(known), np.diag(known)))
-    seen = sampled / np.outer(spread, spread)
-    along, down = (3, 9), (0, 6)
-    assert likeness[along] == pytest.approx(seen[along], abs=0.2)
-    assert likeness[down] == pytest.approx(seen[down], abs=0.2)
-    assert likeness[along] > 0.2
 
 
 def test_thrust_follows_the_airspeed_it_is_corrected_to() -> None:

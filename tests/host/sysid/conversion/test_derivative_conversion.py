@@ -70,52 +70,6 @@ def agree(found: Quantities, by_hand: Mapping[str, Array]) -> None:
     assert np.max(np.abs(found.values[at] - means) / scale) < 0.06
 
 
-def test_drawn_aircraft_scatter_as_the_covariance_says() -> None:
-    """Formulas written out by hand, 200 000 aircraft, instruments and answers."""
-    start, rng = given(), np.random.default_rng(5)
-    drawn = rng.multivariate_normal(start.values, start.covariance, 200_000).T
-    c = dict(zip(TRUE, drawn, strict=True))
-    e = {n: sd * rng.standard_normal(drawn.shape[1]) for n, sd in ERRORS.items()}
-    a, at = AIRFRAME, PLACE.condition
-    mass = a.mass_kg * (1.0 + e["mass_share"])
-    ixx, iyy, izz = (
-        getattr(a, f"{i}_kgm2") * (1.0 + e[f"{i}_share"]) for i in ("ixx", "iyy", "izz")
-    )
-    qbar = (at.qbar_pa - e["pitot_zero_pa"]) / (1.0 + e["pitot_scale"])
-    V = at.airspeed_mps * np.sqrt(qbar / at.qbar_pa / (1.0 + e["density_share"]))
-    force = qbar * a.wing_area_m2
-    vane = (
-        (1.0 + e["alpha_scale"]) * (1.0 + a.upwash * (1.0 + e["upwash_share"])) / (1.0 + a.upwash)
-    )
-    ca, sa = np.cos(ALPHA), np.sin(ALPHA)
-    lift = mass * 9.80665 / force
-    normal = -c["CL_alpha"] * ca - c["CD_alpha"] * sa + lift * sa
-    axial = c["CL_alpha"] * sa - c["CD_alpha"] * ca + lift * ca
-    steep = c["Cm_alpha"] - (e["cg_z_m"] * axial - e["cg_x_m"] * normal) / a.chord_m
-    hat, det = a.span_m / (2.0 * V), ixx * izz - a.ixz_kgm2**2
-    roll = c["Cl_p"] + e["cg_z_m"] * c["CY_p"] / a.span_m
-    yaw = c["Cn_p"] - e["cg_x_m"] * c["CY_p"] / a.span_m
-    straight = c["Cn_beta"] - e["cg_x_m"] * c["CY_beta"] / a.span_m
-    tip = c["Cl_beta"] + e["cg_z_m"] * c["CY_beta"] / a.span_m
-    by_hand = {
-        "Z_alpha": -force * c["CL_alpha"] / (mass * V) / vane,
-        "M_alpha": force * a.chord_m * steep / iyy / vane,
-        "M_q": force * a.chord_m**2 / (2.0 * V) / iyy
-        * (c["Cm_q"] - (e["cg_z_m"] * sa + e["cg_x_m"] * ca) * c["CL_q"] / a.chord_m),
-        "M_de": force * a.chord_m / iyy / (1.0 + e["elevator_scale"])
-        * (c["Cm_de"] - (e["cg_z_m"] * (c["CL_de"] * sa - c["CD_de"] * ca)
-                         + e["cg_x_m"] * (c["CL_de"] * ca + c["CD_de"] * sa)) / a.chord_m),
-        "L_p": force * a.span_m * hat * (izz * roll + a.ixz_kgm2 * yaw) / det,
-        "N_beta": force * a.span_m * (a.ixz_kgm2 * tip + ixx * straight) / det
-        / (1.0 + e["beta_scale"]),
-    }  # fmt: skip
-    found = to_derivatives(start, PLACE, ERRORS)
-    agree(found, by_hand)
-    # Inertia is 2.9 % of M_q: leaving it out shows.
-    less = to_derivatives(start, PLACE, {k: v for k, v in ERRORS.items() if k != "iyy_share"})
-    assert less.deviation("M_q") < 0.95 * found.deviation("M_q")
-
-
 def test_coefficients_of_drawn_derivatives_scatter_as_the_covariance_says() -> None:
     exact, rng = to_derivatives(given(), PLACE, {}), np.random.default_rng(8)
     drawn = rng.multivariate_normal(exact.values, exact.covariance, 200_000).T

@@ -46,35 +46,6 @@ def _flown(model: LinearModel, seed: int) -> Maneuver:
     return replace(data, outputs=y.T + 0.002 * rng.standard_normal(y.T.shape))
 
 
-@pytest.mark.parametrize("prior_sd", [1e3, 1e-4])
-def test_a_further_parameter_is_estimated_along(prior_sd: float) -> None:
-    still, free = _models()
-    data = [_flown(free, seed) for seed in (1, 2)]
-    free = replace(free, parameters=(*still.parameters, Parameter("extra", 0.0, prior_sd=prior_sd)))
-    both = fit("output-error-white", free, data, multiple_starts=False)
-    alone = fit("output-error-white", still, data, multiple_starts=False)
-    one_step = one_step_of(alone, data, TRIM)
-    assert one_step is not None
-    one = replace(still, B=still.B.copy())
-    one.B[still.states.index("q_radps"), -1] = 1.0
-    found = one_step.joint(still, TRIM, data, [(one, data)], [prior_sd])
-    count = len(still.parameters)
-    added = both.value("extra")
-    if prior_sd > 1.0:
-        sd = float(np.sqrt(found.covariance[0, 0]))
-        assert added == pytest.approx(EXTRA, abs=0.2)
-        # Noise is judged by the residuals of the fit before, which lacked the parameter.
-        assert found.added[0] == pytest.approx(added, abs=0.3 * sd)
-        before = np.abs(alone.estimate[:count] - both.estimate[:count])
-        after = alone.estimate + found.shares.sum(axis=0)
-        assert np.all(
-            np.abs(after[:count] - both.estimate[:count])
-            < 0.25 * before + 0.2 * both.half_width()[:count]
-        )
-    else:
-        assert abs(found.added[0]) < 0.05  # held to its prior
-
-
 def test_nothing_new_moves_nothing() -> None:
     still, free = _models()
     data = [_flown(free, 3)]

@@ -32,16 +32,6 @@ LINEAR_ROLL = {
     "B": [["L_da"]],
     "parameters": {"L_p": -4.0, "L_da": 30.0},
 }
-PITCH = {
-    "kind": "equations",
-    "inputs": ["elevator_rad"],
-    "rates": {
-        "alpha_rad": "Za*alpha_rad + q_radps",
-        "q_radps": "Ma*alpha_rad + Mq*q_radps + Md*elevator_rad",
-    },
-    "outputs": {"alpha_rad": "alpha_rad", "q_radps": "q_radps", "az_mps2": "17*Za*alpha_rad"},
-    "parameters": {"Za": -5.0, "Ma": -50.0, "Mq": -6.0, "Md": -60.0},
-}
 
 
 @pytest.fixture(autouse=True)
@@ -84,41 +74,6 @@ def served(late_s: float) -> Maneuver:
 
 def equations(**changed: object) -> NonlinearModel:
     return equations_from({**ROLL, **changed})
-
-
-def test_the_likelihood_is_that_of_a_kalman_filter_written_with_matrices() -> None:
-    """Two states, three outputs of one instant, one of them missing now and then."""
-    rng = np.random.default_rng(3)
-    model = equations_from(PITCH)
-    y, u = 0.1 * rng.standard_normal((40, 3)), 0.1 * rng.standard_normal((40, 1))
-    sampled = rng.random((40, 3)) < 0.7
-    problem = EquationFilterProblem(
-        model, [Maneuver(0.02, u, y, sampled=sampled)], ("alpha_rad", "q_radps")
-    )
-    theta = np.array([-5.0, -50.0, -6.0, -60.0, 0.01, 0.2, *np.log([0.2, 2.0, 0.05, 0.1, 0.5])])
-    found = problem.evaluate(theta)
-    assert found is not None
-    A, B = np.array([[-5.0, 1.0], [-50.0, -6.0]]), np.array([[0.0], [-60.0]])
-    C = np.array([[1.0, 0.0], [0.0, 1.0], [-85.0, 0.0]])
-    R = np.diag([0.05, 0.1, 0.5]) ** 2
-    F, Q = discrete_noise(A, np.array([0.2, 2.0]) ** 2, 0.02)
-    fine = 200
-    x, P, cost = np.array([0.01, 0.2]), np.zeros((2, 2)), 0.0
-    step = linalg.expm(np.block([[A, B], [np.zeros((1, 3))]]) * 0.02 / fine)
-    for k in range(40):
-        seen = sampled[k]
-        H, e = C[seen], (y[k] - C @ x)[seen]
-        if seen.any():
-            S = H @ P @ H.T + R[np.ix_(seen, seen)]
-            cost += 0.5 * float(e @ np.linalg.solve(S, e) + np.log(np.linalg.det(S)))
-            K = P @ H.T @ np.linalg.inv(S)
-            x, P = x + K @ e, P - K @ H @ P
-        if k < 39:
-            for part in range(fine):
-                held = u[k] + (part + 0.5) / fine * (u[k + 1] - u[k])
-                x = step[:2, :2] @ x + step[:2, 2:] @ held
-            P = F @ P @ F.T + Q
-    assert found.cost == pytest.approx(cost, rel=2e-4)
 
 
 @pytest.mark.parametrize(("decay", "variance"), [("2.0", 0.5**2 / 4.0), ("0.0", 0.0)])
@@ -261,31 +216,3 @@ def test_without_a_compiler_a_long_record_is_refused_in_a_line(
     long = Maneuver(DT_S, np.tile(rolled().inputs, (11, 1)), still)
     with pytest.raises(IdentificationError, match="takes hours without numba"):
         fit("filter-error", equations(), [long])
-
-
-def test_a_stiff_servo_guessed_slow_is_not_where_it_was_guessed() -> None:
-    # Two passes ended between guess and truth: 25 to 44 % low, known to 10 to 16 %.
-    truth = np.array([-5.0, 40.0, 60.0])
-    fine, samples = 50, 80
-    u = 0.1 * np.sign(np.sin(2.5 * np.arange(samples) * DT_S))
-    u[:6] = 0.0
-    at_s = DT_S / fine * np.arange(samples * fine)
-    stick = np.interp(at_s, DT_S * np.arange(samples), u)
-    servo, p = np.zeros(len(at_s)), np.zeros(len(at_s))
-    for k in range(len(at_s) - 1):
-        servo[k + 1] = servo[k] + DT_S / fine * truth[2] * (stick[k] - servo[k])
-        p[k + 1] = p[k] + DT_S / fine * (truth[0] * p[k] + truth[1] * servo[k])
-    noise = 0.002 * np.random.default_rng(3).standard_normal(samples)
-    model = equations(
-        rates={
-            "p_radps": "L_p*p_radps + L_da*servo_rad",
-            "servo_rad": "w_radps*(aileron_rad - servo_rad)",
-        },
-        parameters={"L_p": -4.0, "L_da": 30.0, "w_radps": {"start": 12.0, "lower": 2.0}},
-    )
-    data = [Maneuver(DT_S, u[:, None], (p[::fine] + noise)[:, None])]
-    found = fit("extended-kalman", model, data)
-    half = found.half_width()
-    for name, expected in zip(("L_p", "L_da", "w_radps"), truth, strict=True):
-        assert abs(found.value(name) - expected) <= half[found.index(name)], name
-    assert found.value("w_radps") > 50.0

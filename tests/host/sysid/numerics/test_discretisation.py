@@ -10,7 +10,7 @@ from host.sysid.numerics import OutputProblem, discretise
 from host.sysid.numerics.ar_noise import ArNoise, ar_filter, autocovariance
 from host.sysid.numerics.fractional_delay import delay_columns, slope_by_delay
 from host.sysid.numerics.process_noise import discrete_noise
-from scipy import linalg, signal
+from scipy import linalg
 
 STATES = ("alpha_rad", "q_radps")
 
@@ -58,61 +58,6 @@ def tied_model(hold: str = "zoh", delays: tuple[DelayGroup, ...] = ()) -> Linear
 def drive(samples: int = 160) -> np.ndarray:
     rng = np.random.default_rng(7)
     return np.cumsum(rng.standard_normal((samples, 2)), axis=0) * 0.02
-
-
-def respond(problem: OutputProblem, theta: np.ndarray) -> np.ndarray:
-    response = problem.respond(theta)
-    assert response is not None
-    return np.concatenate([r.y.ravel() for r in response])
-
-
-@pytest.mark.parametrize("dt_s", [0.01, 0.05, 0.9])
-@pytest.mark.parametrize("hold", ["zoh", "foh"])
-def test_response_agrees_with_scipy(hold: str, dt_s: float) -> None:
-    model = tied_model(hold)
-    u = drive()
-    problem = OutputProblem(model, [Maneuver(dt_s, u, np.zeros((len(u), 3)))])
-    theta = np.concatenate([model.start, [0.4, -0.2, 0.03, -0.5]])
-    A, B, C, D = model.matrices(theta)
-    wide = np.column_stack([B, [0.0, 0.4]])
-    constant = np.column_stack([u, np.ones(len(u))])
-    time_s = np.arange(len(u)) * dt_s
-    expected = signal.lsim(
-        (A, wide, C, np.column_stack([D, np.zeros(3)])),
-        constant,
-        time_s,
-        X0=theta[-2:],
-        interp=hold == "foh",
-    )[1]
-    expected[:, 2] += -0.2
-    response = problem.respond(theta)
-    assert response is not None
-    np.testing.assert_allclose(response[0].y.T, expected, rtol=1e-9, atol=1e-10)
-
-
-@pytest.mark.parametrize("hold", ["zoh", "foh"])
-def test_slopes_agree_with_finite_differences(hold: str) -> None:
-    delays = (DelayGroup("delay_vane_s", ("alpha_rad",)), DelayGroup("delay_imu_s", ("az_mps2",)))
-    model = tied_model(hold, delays)
-    u = drive()
-    blank = np.zeros((len(u), 3))
-    problem = OutputProblem(model, [Maneuver(0.02, u, blank), Maneuver(0.02, u[::-1], blank)])
-    theta = np.concatenate(
-        [model.start, [0.013, -0.027], [0.4, -0.2, 0.03, -0.5], [0.1, 0.3, -0.02, 0.2]]
-    )
-    response = problem.respond(theta)
-    assert response is not None
-    analytic = np.zeros((2 * 3 * len(u), len(theta)))
-    for number in range(2):
-        block = response[number].sensitivities.reshape(3 * len(u), -1)
-        analytic[number * 3 * len(u) : (number + 1) * 3 * len(u), problem.columns(number)] = block
-    for k in range(len(theta)):
-        step = 1e-6 * max(1.0, abs(theta[k]))
-        up, down = theta.copy(), theta.copy()
-        up[k] += step
-        down[k] -= step
-        numeric = (respond(problem, up) - respond(problem, down)) / (2.0 * step)
-        np.testing.assert_allclose(analytic[:, k], numeric, rtol=2e-5, atol=2e-6)
 
 
 def test_delay_of_a_cubic_is_exact_and_its_slope_too() -> None:

@@ -1,6 +1,5 @@
 """Several records and stretches: one set of derivatives, constants of their own, any rates."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -157,37 +156,6 @@ def test_records_of_two_rates_are_fitted_by_every_method_or_refused_in_a_line(
     assert found.value("M_alpha") == pytest.approx(TRUE["M_alpha"], rel=near)
     if method not in CRUDE:
         assert found.value("M_de") == pytest.approx(TRUE["M_de"], rel=near)
-
-
-def test_the_verb_takes_stretches_of_several_records(
-    two: tuple[Drawn, Drawn], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    paths = [tmp_path / "a.csv", tmp_path / "b.csv"]
-    for one, path in zip(two, paths, strict=True):
-        one.table().to_csv(path, index=False)
-    own = tmp_path / "own.toml"
-    own.write_text(
-        'name = "own"\nhold = "zoh"\nstates = ["alpha_rad", "q_radps"]\ninputs = ["elevator_rad"]\n'
-        'outputs = ["alpha_rad", "q_radps"]\ndelays = []\n'
-        'A = [["Z_alpha", 1.0], ["M_alpha", "M_q"]]\nB = [["Z_de"], ["M_de"]]\n'
-    )
-    a = [str(paths[0]), "--from", "0", "--to", "2", "--from", "2.1", "--to", "3.9"]
-    b = [str(paths[1]), "--to", "1.6"]
-    chosen = ["--model", str(own), "--method", "output-error-white", "--json"]
-    assert main(["identify", *a, *b, *chosen]) == 0
-    said = json.loads(capsys.readouterr().out)
-    stretches: list[Any] = [[(0, 2), (2.1, 3.9)], (None, 1.6)]
-    found = host.identify(paths, models=own, methods="output-error-white", stretches=stretches)
-    [answer] = found.linear
-    assert {m.name: round(m.dt_s, 6) for m in answer.maneuvers} == {
-        "stretch from 0.0 to 2.0 s of flight 1": 0.02,
-        "stretch from 2.1 to 3.9 s of flight 1": 0.02,
-        "stretch from 0.0 to 1.6 s of flight 2": 0.01,
-    }
-    for name, value in TRUE.items():
-        half = answer.result.half_width()[answer.result.index(name)]
-        assert abs(answer.result.value(name) - value) < 2.0 * half, name
-        assert said["answers"][0]["parameters"][name]["value"] == answer.result.value(name)
 
 
 def test_records_in_one_file_are_parted_by_their_gap(two: tuple[Drawn, Drawn]) -> None:

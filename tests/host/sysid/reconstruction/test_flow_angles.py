@@ -12,7 +12,6 @@ from host.sysid.pipeline import ReadingOptions, aircraft_data, prepare, read_fli
 from host.sysid.pipeline.flight_preparation import PreparedFlight
 from host.sysid.reconstruction import Compatibility
 from host.sysid.reconstruction.flow_angles import FlowAngles, flying, reconstruct_flow_angles
-from host.sysid.reconstruction.linear_smoother import Step, smooth
 from host.twin.flight.fly import fly
 from host.twin.outcome.autopilot_logs import write_autopilot_log
 from host.twin.sensors.local_flow import air_data
@@ -22,41 +21,6 @@ from studies.no_vanes import of_an_autopilot
 from tests.host.readers.autopilot_flights import truth, write
 
 AIRCRAFT = "ultrastick25e"
-
-
-def test_smoother_is_least_squares() -> None:
-    """Means and covariances are those of one weighted least-squares problem of all states."""
-    rng = np.random.default_rng(5)
-    size, count = 3, 12
-    mean, start = rng.normal(size=size), np.diag([1.0, 2.0, 0.5])
-    steps = [
-        Step(
-            np.eye(size) + 0.1 * rng.normal(size=(size, size)), rng.normal(size=size),
-            np.array([0.3, 0.1, 0.2]), rng.normal(size=(k % 3, size)), rng.normal(size=k % 3),
-            rng.uniform(0.5, 1.0, k % 3),
-        )
-        for k in range(count)
-    ]  # fmt: skip
-    rows, sides = (
-        [np.linalg.inv(np.sqrt(start)) @ np.eye(size, size * count)],
-        [np.linalg.inv(np.sqrt(start)) @ mean],
-    )
-    for k, step in enumerate(steps):
-        here = np.eye(size, size * count, k * size)
-        rows.append((step.H @ here) / step.sd[:, None])
-        sides.append(step.seen / step.sd)
-        if k + 1 < count:
-            there = np.eye(size, size * count, (k + 1) * size)
-            rows.append((there - step.F @ here) / np.sqrt(step.power)[:, None])
-            sides.append(step.known / np.sqrt(step.power))
-    J, y = np.vstack(rows), np.concatenate(sides)
-    covariance = np.linalg.inv(J.T @ J)
-    expected = (covariance @ J.T @ y).reshape(count, size)
-    means, spreads = smooth(mean, start, steps)
-    np.testing.assert_allclose(means, expected, atol=1e-7)
-    for k in range(count):
-        own = slice(k * size, (k + 1) * size)
-        np.testing.assert_allclose(spreads[k], covariance[own, own], atol=1e-7)
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,5 @@
 """Data compatibility: kinematics are exact, injected errors come back, the unknowable is named."""
 
-from dataclasses import replace
 from functools import lru_cache
 from types import SimpleNamespace
 from typing import cast
@@ -280,42 +279,6 @@ def test_every_axis_has_stretches_of_its_own() -> None:
     most = np.max([np.std(part, axis=0) for part in parts], axis=0)
     lively = np.sum(swing > 0.5 * most, axis=0)
     assert lively.min() >= 2
-
-
-def test_vanes_ahead_of_the_cg_feel_rotation_as_late_as_the_flow() -> None:
-    """Where the drawing has them or found by the fit: the same vane."""
-    t = np.arange(200)[:, None] * 0.01
-    rates = 0.05 * np.sin(2.0 * np.pi * np.array([0.7, 0.9, 0.5]) * t)
-    segment = Segment(
-        dt_s=0.01,
-        rates=rates,
-        force=np.tile([0.98, -0.98, -9.66], (200, 1)),
-        density_kgpm3=1.2,
-        airspeed_mps=np.full(200, 17.0),
-        measured=np.zeros((3, 100)),
-        attitude=rotation(0.1, 0.1, 0.0),
-        velocity_mps=np.array([16.9, 0.2, 0.5]),
-        fixes=np.full(100, -1),
-    )
-    prior = {"vane_delay_s": (0.02, 0.01), "vane_x_m": (0.0, 0.1), "vane_z_m": (0.0, 0.1)}
-    drawn, found, none = (
-        PathProblem([replace(segment, vane_m=place)], AIR, prior, np.full(6, 0.1), 2)
-        for place in ((0.2, 0.1), (0.0, 0.0), (0.0, 0.0))
-    )
-    theta = found.prior_mean.copy()
-    theta[1:3] = 0.2, 0.1
-    y = [p.respond(x) for p, x in ((drawn, drawn.prior_mean), (found, theta))]
-    bare = none.respond(none.prior_mean)
-    assert y[0] is not None
-    assert y[1] is not None
-    assert bare is not None
-    np.testing.assert_allclose(y[0][0].y, y[1][0].y, atol=1e-12)
-    # 20 ms late like the rest of the angle: -q x / V of then, not of now (11 % away).
-    late = -np.interp(t[:, 0] - 0.02, t[:, 0], rates[:, 1]) * 0.2 / 17.0
-    felt = late.reshape(-1, 2).mean(axis=1)[5:]
-    np.testing.assert_allclose(
-        (y[0][0].y - bare[0].y)[1, 5:], felt, atol=0.03 * float(np.max(np.abs(felt)))
-    )
 
 
 def test_without_gps_the_pitot_scale_is_called_unobservable() -> None:
