@@ -9,9 +9,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from host.aircraft.mass_properties import airframe_data
+from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.cli import main
+from host.instrument.deviations import dynamic_pressure_share
+from host.instrument.instrument_errors import InstrumentErrors, standard_errors
 from host.sysid import Maneuver, fit
+from host.sysid.aerodynamics import (
+    ShiftedEstimate,
+    coefficient_parts,
+    coefficients,
+)
 from host.sysid.answer import true_coefficients
 from host.sysid.answer.estimate_lines import model_lines
 from host.sysid.errors import add_systematic_covariance, systematic_error_shifts
@@ -268,6 +275,37 @@ def test_one_step_foretells_the_fit_of_disturbed_data() -> None:
         1.96 * np.linalg.norm([m.estimate[k] - result.estimate[k] for m in moved.values()]),
     )
     assert wide.half_width()[k] == pytest.approx(expected_half, rel=1e-3)
+
+
+def test_a_better_pitot_narrows_a_coefficient() -> None:
+    columns, maneuver, model = short_period()
+    result = fit("output-error-white", model, [maneuver])
+    airframe = AirframeData("a", 2.0, 0.04, 0.08, 0.12, 0.0, 0.3, 1.2, 0.25)
+    condition = Condition(17.0, float(columns["qbar_pa"].mean()))
+    standard = standard_errors()
+
+    def half(*moved: ShiftedEstimate, errors: InstrumentErrors | None = None) -> float:
+        table = coefficients(coefficient_parts(result, airframe, condition, moved, errors))
+        return next(c.half_width / abs(c.value) for c in table if c.name == "Cm_alpha")
+
+    def pitot(share: float) -> ShiftedEstimate:
+        return ShiftedEstimate("pitot_scale", result.estimate, 1.0, 1.0 + share)
+
+    turned = result.estimate.copy()
+    turned[result.index("M_alpha")] *= 1.03
+    # Where reconstruction says nothing of the pitots, their own file does.
+    plain = half()
+    share = dynamic_pressure_share(standard, condition.qbar_pa)
+    assert 0.01 < share < 0.03
+    none = half(errors=standard.scaled(0.0, "pitot_scale", "pitot_zero_pa"))
+    assert plain == pytest.approx(np.hypot(none, 1.96 * share), rel=1e-3)
+    # Where it does, that alone counts, larger or smaller.
+    for moved in (0.001, 0.01, 0.05):
+        expected = np.hypot(none, 1.96 * (1.0 - 1.0 / (1.0 + moved)))
+        assert half(pitot(moved)) == pytest.approx(expected, rel=1e-3)
+    assert half(ShiftedEstimate("imu_tilt_y_rad", turned, 1.0, 1.0)) == pytest.approx(
+        np.hypot(plain, 1.96 * 0.03), rel=1e-3
+    )
 
 
 def test_equation_error_no_longer_takes_late_vanes_for_damping(

@@ -4,21 +4,29 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from host.aircraft.mass_properties import Condition
 from host.sysid import Maneuver, fit
-from host.sysid.models import Parameter, Term, model_from
+from host.sysid.answer import answer_document
+from host.sysid.answer.estimate_lines import model_lines
+from host.sysid.linear import Answer
+from host.sysid.models import Parameter, Term, Trim, model_from
 from host.sysid.models.collinearity import collinearity, constant_inputs
 from host.sysid.models.diagnostics import (
     NOT_IDENTIFIABLE,
+    WEAKLY_IDENTIFIABLE,
     assess_identifiability,
+    bound_exceedance_probability,
     identifiability_flags,
     reference_values,
     signal_fits,
     whiteness,
 )
 from host.sysid.models.modal_analysis import modes, modes_of
-from scipy import signal
+from scipy import signal, stats
 from studies.data import TRUTH, noisy
 from studies.navion import navion, navion_free, navion_structured
+
+from tests.host.sysid.verdicts import verdict_lines, verdict_of
 
 
 def test_figures_of_fit_equal_their_definitions() -> None:
@@ -54,6 +62,36 @@ def test_navion_is_answered_and_the_thesis_example_is_refused() -> None:
     assert "M_de" not in named
 
 
+@pytest.mark.parametrize(
+    ("ratio", "grade"),
+    [(0.7, NOT_IDENTIFIABLE), (1.2, WEAKLY_IDENTIFIABLE), (1.6, WEAKLY_IDENTIFIABLE), (3.0, None)],
+)
+def test_probability_of_exceeding_is_that_of_a_normal_value_over_its_bound(
+    ratio: float, grade: str | None
+) -> None:
+    """One parameter, far above its floor: P(|theta| < sigma) of a normal theta by its formula."""
+    maneuver = noisy(3, 0.01)
+    result = fit("output-error", navion_structured(), [maneuver])
+    k = result.index("Z_alpha")
+    covariance = result.covariance.copy()
+    covariance[k, :] = covariance[:, k] = 0.0
+    covariance[k, k] = (result.estimate[k] / ratio) ** 2
+    doubted = replace(result, covariance=covariance)
+    single, any_of_them = bound_exceedance_probability(doubted, [maneuver])
+    # The prior pulls it a little: three times the whole state rate, here about its own size.
+    expected = stats.norm.cdf(1.0 - ratio) - stats.norm.cdf(-1.0 - ratio)
+    assert single[k] == pytest.approx(expected, abs=0.1)
+    assert any_of_them == pytest.approx(float(single[k]), abs=0.03)
+    found = assess_identifiability(doubted, [maneuver])
+    assert found.not_identifiable == (grade == NOT_IDENTIFIABLE)
+    assert {r.name: r.grade for r in found.flags} == ({"Z_alpha": grade} if grade else {})
+    for named in found.flags:
+        assert named.probability == pytest.approx(float(single[k]))
+        if ratio > 1.0:
+            assert f"probability of {100.0 * single[k]:.0f} %" not in named.reason
+            assert "of its value" in named.reason
+
+
 def test_collinear_parameters_are_named_with_their_partner_and_grade() -> None:
     rng = np.random.default_rng(9)
     maneuver = noisy(9, 0.05)
@@ -74,6 +112,47 @@ def test_collinear_parameters_are_named_with_their_partner_and_grade() -> None:
     assert {"M_de", "M_tab"} <= set(found.names(NOT_IDENTIFIABLE))
     assert "its correlation with M_de is" in named["M_tab"].reason
     assert "Z_alpha" not in named
+
+
+def test_both_grades_reach_the_words_the_table_and_the_document() -> None:
+    maneuver = noisy(3, 0.01, duration_s=2.0)
+    result = fit("output-error", navion_structured(), [maneuver])
+    found = assess_identifiability(result, [maneuver])
+    cannot, doubtful = found.names(NOT_IDENTIFIABLE), found.names(WEAKLY_IDENTIFIABLE)
+    assert cannot
+    assert doubtful
+    answer = Answer(
+        template="longitudinal",
+        method="output-error",
+        model=result.model,
+        trim=Trim(17.0),
+        condition=Condition(17.0, 177.0),
+        maneuvers=(maneuver,),
+        used=(),
+        held_out=(),
+        result=result,
+        fits=(),
+        validation=(),
+        identifiability_flags=found.flags,
+        collinearity=collinearity(result),
+        modes=(),
+        coefficients=(),
+        constant_inputs=(),
+        delays={},
+    )
+    text = verdict_lines([answer], [])
+    table = model_lines(answer, verdict_of(answer))
+    document = answer_document(answer, text, verdict_of(answer))
+    for named in found.flags:
+        assert f"  not known: {named.name} ({named.reason})" in text
+        assert any(line.split()[0] == named.name and " not" in line for line in table)
+    trusted = next(line for line in text if "good (" in line)
+    assert not set(cannot + doubtful) & {w.strip(",") for w in trusted.split()}
+    assert {r["name"]: r["grade"] for r in document["refused"]} == {
+        **dict.fromkeys(cannot, NOT_IDENTIFIABLE),
+        **dict.fromkeys(doubtful, WEAKLY_IDENTIFIABLE),
+    }
+    assert all(0.05 < r["probability"] <= 1.0 for r in document["refused"])
 
 
 def test_small_parameters_are_measured_by_what_would_matter() -> None:
