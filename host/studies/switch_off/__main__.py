@@ -1,6 +1,6 @@
 """Paired flights of the worlds of `judgement`, with steps on and off.
 
-    python -m studies.switch_off --off "echoes,copies;free response" --flights 2
+    python -m studies.switch_off --off "echoes,headings;free response" --flights 2
 
 Steps of one group, by commas, are off together; groups stand between semicolons. Rows go to a file
 that a later run continues. Printed is what a group changes against the same flights with all steps:

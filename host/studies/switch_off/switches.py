@@ -99,7 +99,7 @@ SWITCHES = (
     ),
     _one(
         "echoes",
-        "drops inputs that copy another or follow the attitude",
+        "drops inputs that follow the attitude or swing faintly beside another",
         "maneuvers.overlapping_inputs:without_echoes",
         _straight,
     ),
@@ -107,12 +107,6 @@ SWITCHES = (
         "attitude followed",
         "takes a hand that levels for an echo",
         "maneuvers.overlapping_inputs:_follows_attitude",
-        gives(False),
-    ),
-    _one(
-        "copies",
-        "takes a surface that copies another for an echo",
-        "maneuvers.overlapping_inputs:_copied",
         gives(False),
     ),
     _one(

@@ -79,12 +79,13 @@ def test_an_input_that_begins_behind_another_ends_its_window() -> None:
     assert found[ELEVATOR].fit_window()[1] == pytest.approx(6.0, abs=0.05)
 
 
-def test_a_hand_that_moves_both_sticks_flies_one_input() -> None:
+def test_a_hand_that_moves_both_sticks_flies_two_inputs() -> None:
+    """Each drives motion of its own, at once or apart."""
     t = np.arange(0.0, 20.0, 0.02)
     rudder = steps(t, 3.0, 0.5, 12.0, 1, -1)
-    assert set(found_in(t, elevator_rad=0.15 * rudder, rudder_rad=rudder)) == {RUDDER}
-    small = steps(t, 3.3, 0.25, 1.8, 1, -1)  # as small, with edges of its own
-    assert set(found_in(t, elevator_rad=small, rudder_rad=rudder)) == {ELEVATOR, RUDDER}
+    apart = steps(t, 3.3, 0.25, 1.8, 1, -1)
+    for elevator in (0.15 * rudder, apart):
+        assert set(found_in(t, elevator_rad=elevator, rudder_rad=rudder)) == {ELEVATOR, RUDDER}
 
 
 def test_a_hand_that_levels_flies_no_input() -> None:

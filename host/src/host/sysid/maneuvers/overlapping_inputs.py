@@ -2,8 +2,8 @@
 
 A surface that moves beside another may be an input of its own, however small: 1.5 degrees of the
 elevator beside 5 of the rudder tell all of the longitudinal motion. What tells an echo is where its
-motion comes from: it copies the other surface (a hand that moves both sticks), it follows the
-attitude (a pilot who takes over), or it swings faintly without an edge (handling, noise).
+motion comes from: it follows the attitude (a pilot who takes over), or it swings faintly without an
+edge (handling, noise).
 """
 
 from __future__ import annotations
@@ -21,9 +21,6 @@ if TYPE_CHECKING:
 
 FAINT = 0.2  # of an input: a weaker one of another surface is the pilot's, and ends no response
 WEAKER = 0.5  # of an input that it overlaps: a stronger one is no echo
-COPIED = 0.9  # share of the motion that another surface explains
-COPY_DELAYS_S = (0.0, 0.04, 0.1)  # between both, at most
-AROUND_S = 1.0  # beside both inputs, where a copy rests too
 # Which way a hand that levels moves a surface, from the jump on with which it takes over.
 LEVELLING = {"elevator_rad": ("theta_rad", 1.0), "aileron_rad": ("phi_rad", -1.0)}
 FOLLOWS_S, FOLLOWED = (0.1, 1.5), 0.75
@@ -77,26 +74,8 @@ def _echo(item: DetectedManeuver, other: DetectedManeuver, columns: Mapping[str,
     overlap = item.start_s < other.input_end_s and other.start_s < item.input_end_s
     if not overlap or not _weaker(item, other, WEAKER):
         return False
-    if _faint_beside(item, other) and (item.swings or _copied(item, other, columns)):
-        return True
-    return _follows_attitude(item, columns)
-
-
-def _copied(item: DetectedManeuver, other: DetectedManeuver, columns: Mapping[str, Array]) -> bool:
-    """Return whether a surface does what another does, at once or a moment later."""
-    t = columns["t_s"]
-    first_s = min(item.start_s, other.start_s) - AROUND_S
-    last_s = max(item.input_end_s, other.input_end_s) + AROUND_S
-    rows = np.flatnonzero((t >= first_s) & (t <= last_s))
-    dt_s = float(np.median(np.diff(t)))
-    moved = [
-        columns[other.axis][np.maximum(rows - round(delay_s / dt_s), 0)]
-        for delay_s in COPY_DELAYS_S
-    ]
-    regressors = np.column_stack([np.ones(len(rows)), *moved])
-    target = columns[item.axis][rows]
-    left = target - regressors @ np.linalg.lstsq(regressors, target)[0]
-    return float(np.var(left)) < (1.0 - COPIED) * float(np.var(target))
+    faint = item.swings and _faint_beside(item, other)
+    return faint or _follows_attitude(item, columns)
 
 
 def _follows_attitude(item: DetectedManeuver, columns: Mapping[str, Array]) -> bool:
