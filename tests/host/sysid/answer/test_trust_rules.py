@@ -124,27 +124,6 @@ def test_a_sign_counts_however_narrow_the_interval(right: Answer, name: str, bes
     assert name in relied_on(own)
 
 
-@pytest.mark.parametrize(
-    ("channel", "lost"),
-    [
-        ("elevator_rad", {"Z_de", "M_de"}),
-        ("q_radps", {"Z_q", "M_alpha", "M_q", "M_de"}),
-        ("az_mps2", {"Z_alpha", "Z_q", "Z_de"}),
-    ],
-)
-def test_a_channel_with_an_open_finding_is_not_relied_on(
-    channel: str, lost: set[str], right: Answer
-) -> None:
-    found = Finding("angle-size", (channel,), "it moves twice as fast", done="scale estimated")
-    evidence = Evidence((found,))
-    assert relied_on(right) - relied_on(right, evidence) == relied_on(right) & lost
-    assert relied_on(right, Evidence((found.accept(),))) == relied_on(right, evidence)
-    closed = replace(found, closed=True)
-    assert relied_on(right, Evidence((closed,))) == relied_on(right)
-    words = f"{channel} has an open finding (angle-size)"
-    assert any(line.endswith(words) for line in verdict_lines([right], [], evidence))
-
-
 def test_an_airspeed_in_doubt_takes_the_forces_over_it() -> None:
     """It is no state of the model: nothing was taken, and half of Y_beta stood under "trust"."""
     answer = answer_to(fly("lateral", "none", "white", 1), "lateral")

@@ -1,7 +1,6 @@
 """Dimensional derivatives to coefficients and back: values, covariance, what cancels."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -144,27 +143,6 @@ def test_the_linear_answer_converts_by_the_same_equations() -> None:
     for name, value in TRUE.items():
         assert found[name].value == pytest.approx(value, rel=1e-9), name
         assert found[name].fit_error == pytest.approx(given().deviation(name), rel=1e-5), name
-
-
-def test_upwash_widens_only_what_a_vane_measured() -> None:
-    """An angle that accelerations tell saw no upwash: 2 % of every slope were for nothing."""
-    out, none = to_derivatives(given(), PLACE, {}), np.zeros((0, 0))
-    frame = replace(AIRFRAME, upwash=0.2, upwash_share=0.5)
-
-    def half_widths(outputs: tuple[str, ...]) -> dict[str, float]:
-        model, many = free_model("pitch", outputs, ("de",)), np.full(len(out.values), 100.0)
-        result = FitResult(
-            "by hand", model, out.names, out.values, out.covariance, out.covariance, many,
-            (), (), "simulation", none, 1, True,
-        )  # fmt: skip
-        parts = coefficient_parts(result, frame, PLACE.condition)
-        return {c.name: c.half_width for c in coefficients(parts)}
-
-    hidden, alpha = half_widths(("q_radps",)), half_widths(("alpha_rad", "q_radps"))
-    added = np.sqrt(alpha["CL_alpha"] ** 2 - hidden["CL_alpha"] ** 2)
-    assert added == pytest.approx(1.96 * 0.1 * TRUE["CL_alpha"], rel=1e-3)
-    assert alpha["Cn_beta"] == hidden["Cn_beta"]
-    assert alpha["Cm_q"] == hidden["Cm_q"]
 
 
 def test_what_is_wrong_is_said() -> None:

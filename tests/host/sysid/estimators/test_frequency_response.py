@@ -86,28 +86,6 @@ def test_a_sweep_of_one_input_gives_the_true_response_where_it_is_coherent() -> 
     assert "chirp-z" in found.method and "partial" not in found.method
 
 
-def test_coherence_is_scipys_of_the_same_records() -> None:
-    rng = np.random.default_rng(2302)
-    u = rng.standard_normal((5, 200))
-    y = signal.lfilter([0.3], [1.0, -0.7], u) + rng.standard_normal(u.shape)
-    u[:, [0, -1]] = y[:, [0, -1]] = 0.0  # no line to take out
-    found = recorded_response(
-        [Maneuver(DT_S, a[:, None], b[:, None]) for a, b in zip(u, y, strict=True)]
-    )
-    assert found.window_s == pytest.approx(4.0)  # five records: each is a window
-    # Lines are averaged over what a window resolves; scipy's are single.
-    (f, cross), (_, own) = (
-        signal.csd(u.ravel(), one.ravel(), fs=1 / DT_S, window="boxcar", nperseg=200, noverlap=0,
-                   detrend=False, nfft=800) for one in (y, u)
-    )  # fmt: skip
-    other = signal.welch(y.ravel(), fs=1 / DT_S, window="boxcar", nperseg=200, noverlap=0,
-                         detrend=False, nfft=800)[1]  # fmt: skip
-    for k in range(0, len(found.frequency_hz), 7):
-        near = np.abs(f - found.frequency_hz[k]) <= 0.5 / found.window_s + 1e-9
-        mean = abs(np.mean(cross[near])) ** 2 / (np.mean(own[near]).real * np.mean(other[near]))
-        assert found.coherence[k, 0, 0] == pytest.approx(mean, abs=1e-3)
-
-
 def test_of_inputs_that_move_together_only_the_one_that_acts_is_coherent() -> None:
     rng = np.random.default_rng(2303)
     first = np.concatenate([sweep(60.0), sweep(60.0)])

@@ -32,7 +32,6 @@ from host.sysid.reconstruction import (
     Compatibility,
     NoAgreementError,
     SensorErrorEstimate,
-    density_share,
 )
 from host.sysid.reconstruction.sensor_corrections import (
     INSTANTANEOUS_ERRORS,
@@ -138,27 +137,6 @@ def test_only_what_is_told_is_taken_out() -> None:
     assert "wind_north_mps" not in left
     # 3 % of pitot, evenly, two of them, against 1 % of density.
     assert pressure_share(found) == pytest.approx(0.6, abs=0.01)
-
-
-def test_pressure_and_density_are_as_open_as_their_files_leave_them() -> None:
-    """Airspeed tells what pitot and density make together, not how much is of which."""
-    pitot, density = 0.02, density_share(None)
-    together = float(np.hypot(pitot, density))
-    half = 1.96 * together
-    found = Compatibility((finding("pitot_scale", 0.0, half, half),), {}, (), gps=False)
-    columns = motion()
-    columns |= {name: np.full(200, 1.0) for name in ("qbar_pa", "density_kgpm3", "airspeed_mps")}
-    left = residual_deviations(found)
-    assert set(left) == {"pitot_scale", "density_share"}
-    moved = [correct_columns(columns, {e: s}, pressure_share(found)) for e, s in left.items()]
-
-    def open_share(*names: str) -> float:
-        """Return the deviation of a product of columns, each of them 1."""
-        return float(np.linalg.norm([np.log(np.prod([m[n][0] for n in names])) for m in moved]))
-
-    assert open_share("qbar_pa") == pytest.approx(pitot, rel=0.02)
-    assert open_share("density_kgpm3") == pytest.approx(density, rel=0.02)
-    assert open_share("airspeed_mps", "airspeed_mps") == pytest.approx(together, rel=0.02)
 
 
 def test_sensors_that_do_not_agree_are_as_open_as_their_file_leaves_them(

@@ -158,27 +158,3 @@ def test_gradient_and_slopes_are_those_of_differences() -> None:
         np.testing.assert_allclose(
             exact[:, :, k] / size[k], here.whitened(0, moved) / size[k], atol=1e-6, err_msg=name
         )
-
-
-def test_information_is_the_covariance_of_the_score() -> None:
-    """Over data that the model itself draws, outputs missing at random."""
-    problem, theta = problem_of("each fifth")
-    one = problem.sampled(0, theta)
-    _, power = problem.noise(theta)
-    steady = known(problem.evaluate(theta)).filters[0]
-    rng, draws = np.random.default_rng(9), 400
-    root, kick = (np.linalg.cholesky(x + 1e-18 * np.eye(3)) for x in (steady.P, steady.Q))
-    scores, told = [], []
-    for _ in range(draws):
-        x, y = one.start + root @ rng.standard_normal(3), np.zeros((SAMPLES, 3))
-        for k, drive in enumerate(problem.output_problem.drive(0)):
-            y[k] = one.read @ np.concatenate([x, drive]) + np.sqrt(power) * rng.standard_normal(3)
-            x = one.step @ np.concatenate([x, drive]) + kick @ rng.standard_normal(3)
-        drawn = FilterProblem(problem.model, [replace(problem.maneuvers[0], outputs=y)], PROCESS)
-        point = known(drawn.evaluate(theta))
-        [information], [score] = drawn.scoring(theta, point)
-        scores.append(score)
-        told.append(information)
-    mean = np.mean(told, axis=0)
-    ratio = np.var(scores, axis=0) / np.diag(mean)
-    np.testing.assert_allclose(ratio, 1.0, atol=5.0 * np.sqrt(2.0 / draws))
