@@ -73,7 +73,7 @@ def test_own_numbers_replace_the_default_and_the_rest_is_named(tmp_path: Path) -
         (HEAD + ALPHA.replace("5.0e-3", '"x"'), "slope is 'x', expected a number"),
         (HEAD + ALPHA.replace("5.0e-3", "[1.0, 2.0]"), "as many zeros as slopes"),
         (HEAD + "[channel]\nalpha_a = 3\n", "expected a table"),
-        (HEAD + ALPHA + "curve = [1.0]\n", "expected two numbers beside one zero"),
+        (HEAD + ALPHA + "curve = [1.0]\n", "expected two numbers with one zero"),
         (HEAD + ALPHA + "curve = [1.0, 1e3]\n", "expected -100 to 100"),
     ],
 )

@@ -15,7 +15,7 @@ def run() -> int:
         import signal
 
         ours = signal.getsignal(signal.SIGINT) is signal.default_int_handler
-        if ours:  # not of a program that was told to ignore it, as behind `nohup`
+        if ours:  # not of a program that ignores it, as behind `nohup`
             signal.signal(signal.SIGINT, _leave)
         from host.cli import main
 

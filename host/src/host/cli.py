@@ -81,7 +81,7 @@ def _ended(arguments: list[str]) -> int:
             try:
                 return _run(arguments)
             finally:
-                sys.stdout.flush()  # here a reader that left, or a full disk, can still be told
+                sys.stdout.flush()  # here a reader that left, or a full disk, can still be reported
     except KeyboardInterrupt:
         return _interrupted()
     except Exception as error:

@@ -2,7 +2,7 @@
 
 Kernels are written in the subset that Python and numba both understand. Nothing here loads numba
 before a kernel is called, and only that kernel is compiled: once per install, with a line that says
-so, for the code is kept beside its source.
+so, for the code is kept next to its source.
 """
 
 from __future__ import annotations
@@ -193,8 +193,8 @@ def generated_source(text: str, kind: str) -> Path:
         Of a file, or of none where nobody may write: it is then compiled in every process.
     """
     stem = f"{kind}_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
-    beside = Path(__file__).parent / "__pycache__" / KEPT
-    for place in sorted(_places(Path(__file__)), key=lambda one: one == beside):
+    by_source = Path(__file__).parent / "__pycache__" / KEPT
+    for place in sorted(_places(Path(__file__)), key=lambda one: one == by_source):
         path = place / f"{stem}{GENERATED}"
         with contextlib.suppress(OSError):
             place.mkdir(parents=True, exist_ok=True)
@@ -281,7 +281,7 @@ def _folder(kernel: Kernel[..., Any]) -> Path | None:
 
 
 def _places(source: Path) -> Iterator[Path]:
-    """Return where code may be kept: where asked, beside its source, in the user's own cache."""
+    """Return where code may be kept: where asked, next to its source, in the user's own cache."""
     asked = os.environ.get("NUMBA_CACHE_DIR")
     if asked:
         yield Path(asked) / KEPT
@@ -294,9 +294,9 @@ def _places(source: Path) -> Iterator[Path]:
 def generated_folders() -> list[Path]:
     """Return the folders that hold compiled code."""
     package = Path(__file__).parent
-    beside = [path for path in package.rglob(f"__pycache__/{KEPT}") if path.is_dir()]
+    by_source = [path for path in package.rglob(f"__pycache__/{KEPT}") if path.is_dir()]
     asked = os.environ.get("NUMBA_CACHE_DIR")
-    return [*beside, *([Path(asked) / KEPT] if asked else [])]
+    return [*by_source, *([Path(asked) / KEPT] if asked else [])]
 
 
 def _digest(kernel: Kernel[..., Any]) -> str:

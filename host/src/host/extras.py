@@ -8,7 +8,7 @@ from host.terminal import command_line
 
 
 def install_hint(library: str | None) -> str:
-    """Return the command that installs a library beside this package.
+    """Return the command that installs a library next to this package.
 
     It names the library itself, which is the same for a wheel and in a clone. ``host[...]`` would
     ask the index for somebody else's package, and so would our own name: we are not on it.

@@ -28,7 +28,7 @@ _watch = _Watch()
 
 
 def stage(text: str) -> None:
-    """Say what is being done now; shown beside the seconds where a verb takes long."""
+    """Say what is being done now; shown with the seconds where a verb takes long."""
     _watch.stage = text
 
 

@@ -76,7 +76,7 @@ def test_one_line_a_solve_with_the_grounds_figure_beside() -> None:
         given = {"samples": samples, "row": 2, "estimate": 58_000, "half_width": half}
         stream.feed(learned(at_us, "cn_beta", enough=half > 0, **given), 0.0)
         stream.feed(learned(at_us, "cn_r", **(given | {"estimate": -70_000})), 0.0)
-    assert told == ["the logger, row 3, 5.0 s: Cn_beta not told, Cn_r not told"]
+    assert told == ["the logger, row 3, 5.0 s: Cn_beta not estimated, Cn_r not estimated"]
     watch.close()
     assert told[1] == (
         "the logger, row 3, 6.0 s: Cn_beta 0.058 +- 0.004 (here 0.06 +- 0.01) enough,"

@@ -9,7 +9,7 @@ from host.cli import main
 from host.log.capture_head import notes_path
 from host.physical.calibration import load_calibration
 from host.preflight.check_list import CheckListInputs, check_list, checked_aircraft
-from host.preflight.preflight_sheet import read_sheet, sheet_beside, sheet_lines
+from host.preflight.preflight_sheet import read_sheet, sheet_lines, sheet_of
 
 from tests.host.logs import ROOT
 from tests.host.preflight.test_hold_check import card
@@ -135,9 +135,9 @@ def test_a_sheet_is_shown_by_host_live_and_only_a_sheet(
     live = ["live", "in.radio@max", "--no-page", "--json"]
     assert main([*live, "--preflight", "sheet.toml"]) == 0
     assert json.loads(capsys.readouterr().out.splitlines()[-1])["go"] is True
-    assert sheet_beside(tmp_path / "in.radio") is None  # a replay writes nothing
+    assert sheet_of(tmp_path / "in.radio") is None  # a replay writes nothing
     assert main([*live, "-o", "out.radio", "--preflight", "sheet.toml"]) == 0
-    beside = sheet_beside(tmp_path / "out.radio")
+    beside = sheet_of(tmp_path / "out.radio")
     assert beside is not None
     assert beside.read_text() == Path("sheet.toml").read_text()
     capsys.readouterr()

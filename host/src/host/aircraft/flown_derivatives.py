@@ -137,7 +137,7 @@ def flown_modes(
 
 
 def _forces(frame: Airframe, point: Array, at: FlownCondition, throttle: float) -> dict[str, float]:
-    """Return specific force along, normal to and beside the path, and angular accelerations."""
+    """Return specific force along, normal to and across the path, and angular accelerations."""
     speed, alpha, beta = (float(x) for x in point[:3])
     x = np.zeros(STATE_COUNT)
     x[U : W + 1] = speed * np.array(

@@ -1,6 +1,6 @@
 """A vane in a file of its own, named by an aircraft file: frequency, damping, friction.
 
-``[sensors] vane = "vane.toml"`` beside the aircraft file; what ``hw/mechanics`` makes of its solids
+``[sensors] vane = "vane.toml"`` by the aircraft file; what ``hw/mechanics`` makes of its solids
 is such a file. A number stands in one of the two files, never in both.
 """
 

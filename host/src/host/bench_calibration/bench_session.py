@@ -49,7 +49,7 @@ class Bench:
     positions : tuple of float
         Of one round; empty: those of the subject.
     into, picture : Path or None
-        None: named by instrument and date; beside the file.
+        None: named by instrument and date; in the file's folder.
     turn_deg : float
         Of the gyros' turntable, in a recording.
     """

@@ -89,5 +89,5 @@ def _draw(subject: Subject, fit: LineFit, doubt: str | None, above: Any, below: 
         fit.channel + (" (doubted)" if doubt else " (curve)" if fit.curve else ""), fontsize=10
     )
     above.set_ylabel(unit)
-    below.set_ylabel(f"beside the line, {unit}" if unit else "beside the line")
+    below.set_ylabel(f"off the line, {unit}" if unit else "off the line")
     below.set_xlabel(subject.tool.setting if subject.tool else "")

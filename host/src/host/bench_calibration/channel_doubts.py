@@ -134,11 +134,11 @@ def _spot(subject: Subject, fit: LineFit, points: Sequence[Held]) -> str | None:
     for place in places:
         here = fit.position == place
         rest = ~here
-        beside = fit.straightened - _line_through(fit.value, fit.straightened, rest)
+        residual = fit.straightened - _line_through(fit.value, fit.straightened, rest)
         # In the mean over all repeats their placings cancel.
-        middle = float(np.median(beside[rest]))
-        scatter = _MAD_TO_SIGMA * float(np.median(np.abs(beside[rest] - middle)))
-        distance = abs(float(beside[here].mean()) - middle)
+        middle = float(np.median(residual[rest]))
+        scatter = _MAD_TO_SIGMA * float(np.median(np.abs(residual[rest] - middle)))
+        distance = abs(float(residual[here].mean()) - middle)
         limit = max(subject.limits["spot"], BEYOND * max(scatter, fit.repeat_zero_sigma)
                     / math.sqrt(here.sum()))  # fmt: skip
         if distance > limit and (best is None or distance / limit > best[0] / best[1]):
@@ -149,7 +149,7 @@ def _spot(subject: Subject, fit: LineFit, points: Sequence[Held]) -> str | None:
     what = "is worn: a dead spot" if subject.name == "pots" else "leaves its line"
     return (
         f"{fit.channel} {what} at {place:g} {_setting(subject)}: {distance:.1f}"
-        f" {UNITS[subject.table]} beside the line of the others in every pass, limit {limit:.1f}"
+        f" {UNITS[subject.table]} off the line of the others in every pass, limit {limit:.1f}"
     )
 
 

@@ -115,7 +115,7 @@ class UsbSource(TypedSource):
         return Held(self._channel, number, position, readings, noise, change, float(t_s[-1]))
 
     def _shown(self, ask: Ask) -> Ask:
-        """Return a function that asks with the present value beside the question while it waits."""
+        """Return a function that asks with the present value by the question while it waits."""
 
         def asked(question: str) -> str:
             last_s = 0.0

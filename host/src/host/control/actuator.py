@@ -13,7 +13,7 @@ from host.instrument.deviations import sensor_error_model
 
 SURFACES = {"roll": "aileron", "pitch": "elevator", "yaw": "rudder"}
 # A pulse every 20 ms holds the output for that long: half of it as delay, and none of it where the
-# pulse has just gone out (ArduPlane, PX4 and INAV write servos at 50 Hz unless told otherwise).
+# pulse has just gone out (ArduPlane, PX4 and INAV write servos at 50 Hz unless set otherwise).
 PULSE_PERIOD_S = 0.020
 
 

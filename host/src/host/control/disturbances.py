@@ -63,7 +63,7 @@ def gust_inputs(
 def gyro_noise_radps(columns: Sequence[Array]) -> float:
     """Return the standard deviation of white noise in columns of a rate.
 
-    Second differences of white noise have six times its variance, and motion that is slow beside
+    Second differences of white noise have six times its variance, and motion that is slow against
     the samples none.
 
     Parameters

@@ -28,7 +28,7 @@ Law = tuple[Array, Array, Array, Array]
 
 @dataclass(frozen=True)
 class PairProblem:
-    """A tuned roll axis of a lateral model, with the rudder beside it."""
+    """A tuned roll axis of a lateral model, with its rudder."""
 
     roll: Problem
     roll_gains: Mapping[str, float]

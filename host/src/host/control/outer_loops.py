@@ -60,7 +60,7 @@ class OuterCheck:
 
     @property
     def line(self) -> str:
-        """What is told of it."""
+        """A line of its margins and parameters."""
         named = ", ".join(f"{name} {value:g}" for name, value in self.parameters.items())
         required = Required()
         if not self.stable:

@@ -260,8 +260,7 @@ def tune(
         before = logged if chosen.words else usual
         found.append(AxisTuning(problem, design(problem, seed=seed), before))
     flown = () if isinstance(source, Sequence) else _airspeeds_mps(source)
-    told = tuning_notes(found, chosen, logged, flown, release)
-    notes = [*([newer] if newer else []), *told]
+    notes = [*([newer] if newer else []), *tuning_notes(found, chosen, logged, flown, release)]
     yaw = None
     try:
         found, yaw = with_rudder(chosen, aircraft, found, seed)
@@ -300,7 +299,7 @@ def _is_whole(one: AxisTuning) -> bool:
 
 
 def unchecked(chosen: Autopilot, axes: Sequence[AxisTuning]) -> Iterator[str]:
-    """Yield a sentence for each loop around gains that their model cannot tell of."""
+    """Yield a sentence for each loop around gains whose motion their model lacks."""
     for outer in chosen.outer({}) if chosen.outer else ():
         for one in axes:
             if one.axis == outer.axis and one.design.gains and not _is_whole(one):
@@ -313,7 +312,7 @@ def with_rudder(
 ) -> tuple[list[AxisTuning], YawTuning | None]:
     """Return axes and rudder; None where the autopilot flies no damper.
 
-    The fastest roll gains stand at their limit: where no damper keeps theirs beside them, those of
+    The fastest roll gains stand at their limit: where no damper keeps its limit with them, those of
     a step more may leave it room.
     """
     found = list(axes)

@@ -1,4 +1,4 @@
-"""Notes of a tuning: what was not known, and what stands in its place."""
+"""Notes of a tuning: what was not known, and what was taken in its place."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def tuning_notes(
     flown_mps : sequence of float
         Least and largest airspeed of the maneuvers; empty where nobody knows.
     release : str
-        Whose names of parameters are told; today's where it is empty.
+        Whose names of parameters are printed; today's where it is empty.
     """
     for missing in {"roll", "pitch"} - {one.axis for one in axes}:
         yield f"no gains for {missing}: the answer has no model of it"
@@ -36,14 +36,14 @@ def tuning_notes(
         yield "a saved model has no correlations: its derivatives are drawn independently"
     settings = [s for one in axes for s in one.problem.structure.settings.values()]
     own = [s for s in settings if s.name in logged]
-    told = tuple(dict.fromkeys(name for one in axes for name in one.problem.structure.assumed))
+    assumed = tuple(dict.fromkeys(name for one in axes for name in one.problem.structure.assumed))
     if not own and chosen.words:
         yield (
             "nobody named the old gains: name the autopilot's parameters with --parameters, or a"
             " log that has them"
         )
-    if told:
-        names = (called(chosen.name, name, release) for name in told)
+    if assumed:
+        names = (called(chosen.name, name, release) for name in assumed)
         yield f"defaults stand for {', '.join(names)}"
     if logged.get("tpa_rate", 0.0) > 0.0 and chosen.name == "inav":
         yield "tpa_rate makes gains follow the throttle, which no aircraft here does: set it to 0"

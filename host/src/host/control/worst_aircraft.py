@@ -1,4 +1,4 @@
-"""The worst aircraft on the 95 % contour of an answer: told, and required of no gains."""
+"""The worst aircraft on the 95 % contour of an answer: reported, and required of no gains."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class WorstAircraft:
 
     @property
     def line(self) -> str:
-        """What is told of it."""
+        """A line of its margins and largest deviations."""
         named = ", ".join(f"{name} {100.0 * share:+.0f} %" for name, share in self.moved[:2])
         return (
             f"worst on the 95 % contour, not required: {self.gain_db:.1f} dB,"

@@ -108,8 +108,8 @@ def _named(target: Path) -> Path | str:
 
 def write_frames(log: FlightLog, kind: str, target: Path) -> list[str]:
     """Write every kind of raw frame to a file of its own; return the files."""
-    beside = Path(log.path.name) if target == STDOUT else target
-    folder = beside.with_suffix(".frames")
+    named = Path(log.path.name) if target == STDOUT else target
+    folder = named.with_suffix(".frames")
     with blamed_on(folder):
         folder.mkdir(parents=True, exist_ok=True)
     files = []

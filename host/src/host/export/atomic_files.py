@@ -14,7 +14,7 @@ LONGEST_NAME = 100  # characters; file systems take 255 bytes
 
 
 def unfinished(path: Path) -> Path:
-    """Return a name beside `path`, with its ending.
+    """Return a name next to `path`, with its ending.
 
     The process is in it, so that it is no file of the user's, nor another run's.
     """
@@ -43,9 +43,9 @@ def blamed_on(target: Path | str) -> Iterator[None]:
 
 @contextmanager
 def atomic_write(path: Path) -> Iterator[Path]:
-    """Give a name beside `path`; what is written there gets its own name once it is whole.
+    """Give a name next to `path`; what is written there gets its own name once it is whole.
 
-    Folders that are missing are made. A device or a pipe has nothing beside it and is written to
+    Folders that are missing are made. A device or a pipe has no such name and is written to
     as it is.
 
     Parameters

@@ -29,7 +29,7 @@ VARIABLES = {
     "HOST_TRACEBACK": "unset: an internal error is one line",
     "CXX": "c++, g++, clang++ or ziglang, the first that is there",
     "OPENBLAS_NUM_THREADS": "1 in identify, predict, maneuvers, convert",
-    "NUMBA_CACHE_DIR": "beside the source, else in the user's cache",
+    "NUMBA_CACHE_DIR": "next to the source, else in the user's cache",
     "XDG_CACHE_HOME": "~/.cache",
     "LOCALAPPDATA": "unset: XDG_CACHE_HOME or ~/.cache",
     "NO_COLOR": "unset: a terminal gets colours, a pipe none",

@@ -30,8 +30,8 @@ SAID = {
     "request": "it does not know this request: another image than this tool's",
     "eeprom": "its EEPROM does not keep what is written",
 }  # fmt: skip
-# What to do about a fault that its name does not tell.
-TOLD = {
+# What to do about a fault whose name does not say it.
+FAULT_TEXTS = {
     "other_version": "the logger's program is of another version than the card (other_version):"
     " pio run -t upload; of a simulated logger: make sitl",
 }
@@ -156,7 +156,7 @@ class CardConsole:
             if answer.result != "airborne" or self._clock() >= until:
                 said = SAID.get(answer.result, answer.result)
                 why = f" ({answer.fault})" if answer.fault != "none" else ""
-                said = TOLD.get(answer.fault, f"{said}{why}")
+                said = FAULT_TEXTS.get(answer.fault, f"{said}{why}")
                 raise CardError(f"{self._link.device}: {said}")
             self._listen(FORGETS_S)
         return answer

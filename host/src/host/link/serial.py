@@ -172,7 +172,7 @@ class SerialLink:
     """An open serial port, closed by ``with``.
 
     Opening it resets a Mega: its DTR line is wired to reset. Windows lets us open without raising
-    DTR. Linux and macOS raise it themselves; there the port is told to leave DTR up when it is
+    DTR. Linux and macOS raise it themselves; there the port is set to leave DTR up when it is
     closed, so that only the first opening after plugging in resets the board.
 
     Parameters
@@ -180,7 +180,7 @@ class SerialLink:
     device : str
         ``COM5``, ``/dev/ttyACM0``.
     baud : int
-        That of the logger's USB line unless told.
+        That of the logger's USB line unless given.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What is received, on disk before anybody looks at it, and the notes beside it."""
+"""What is received, on disk before anybody looks at it, and its notes."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class GroundCapture:
         trace: TracebackType | None,
     ) -> None:
         for file in (self._bytes, self._notes):
-            with contextlib.suppress(OSError):  # a disk that is gone was told of when it went
+            with contextlib.suppress(OSError):  # a disk that is gone was reported when it went
                 os.fsync(file)
             os.close(file)
         self._bytes = self._notes = _CLOSED

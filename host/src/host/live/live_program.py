@@ -141,15 +141,15 @@ def _limit_m(request: LiveRequest) -> float:
 def _unfailing(tell: Callable[[str], None]) -> Callable[[str], None]:
     """Return the same for a terminal that may have gone."""
 
-    def told(text: str) -> None:
+    def reported(text: str) -> None:
         with contextlib.suppress(Exception):
             tell(text)
 
-    return told
+    return reported
 
 
 def _receive(request: LiveRequest, session: LiveSession, tell: Callable[[str], None]) -> None:
-    """Receive until the end; a mistake beside the recorder ends the page, never the recording."""
+    """Receive until the end; a mistake outside the recorder ends the page, never the recording."""
     watch = RecordingWatch(session, tell)
     try:
         asyncio.run(_serve(request, session, watch, tell))

@@ -1,6 +1,6 @@
 """What `host live` shows: bytes that are on disk, through the stream, to whoever looks.
 
-It runs in a thread of its own, beside the recorder's: nothing here can hold up or end a recording.
+It runs in a thread of its own, not the recorder's: nothing here can hold up or end a recording.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Listener(Protocol):
 
 
 class LiveSession:
-    """Shows a source until it ends or is told to; `recorder` has each byte on disk before.
+    """Shows a source until it ends or is stopped; `recorder` has each byte on disk before.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ class LiveSession:
                 self.ended.set()
 
     def _safely(self, show: Callable[..., None], *given: Any) -> None:
-        """Call what shows or judges; a mistake in it is told once and costs nobody else."""
+        """Call what shows or judges; a mistake in it is reported once and costs nobody else."""
         try:
             show(*given)
         except BaseException as error:  # an exit that somebody asked for here is a mistake too

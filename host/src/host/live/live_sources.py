@@ -99,7 +99,7 @@ class UdpSource:
     Parameters
     ----------
     host : str
-        Address to listen at; 127.0.0.1 unless told.
+        Address to listen at; 127.0.0.1 unless given.
     port : int
     """
 

@@ -48,7 +48,7 @@ class LiveStream:
     calibration : Calibration
         Counts to SI.
     texts : collection of bytes
-        Schemas known beside the released ones.
+        Schemas known besides the released ones.
     row_rate_hz : float, optional
         Of rows of text that are played again; others are placed where they arrive.
 

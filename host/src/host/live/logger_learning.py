@@ -1,7 +1,7 @@
 """What the logger itself estimates while it flies a row of its card: frames `learned`.
 
-A consumer of the stream and a listener of the session. Beside each derivative stands the ground's
-own figure, where an aircraft is known.
+A consumer of the stream and a listener of the session. Each derivative has the ground's own
+figure, where an aircraft is known.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from host.live.slow_readings import slow_reading
 
 AXES = {"Cm": "pitch", "Cl": "roll", "Cn": "yaw"}
 SAMPLE_HZ = 50.0  # of the logger's sums (protocol/frames.toml, `learned`)
-_SOLVED_S = 0.3  # of the stream, behind the last derivative of a solve: it is told
+_SOLVED_S = 0.3  # of the stream, behind the last derivative of a solve: it is printed
 _CARD_EVENTS = ("card_enabled", "input_start")
 
 
@@ -52,9 +52,9 @@ class LoggerLearning:
         self._clock = clock
         self._card = False  # whether the logger has one, as far as the stream said
         self._rows: dict[str, dict[str, Any]] = {}
-        self._solved: list[dict[str, Any]] = []  # of the solve that is being told
+        self._solved: list[dict[str, Any]] = []  # of the solve that is arriving
         self._solve_us = 0  # when it began
-        self._now_s = self._row_s = 0.0  # of the last row, and of it when a derivative was told
+        self._now_s = self._row_s = 0.0  # of the last row, and of it when a derivative came
         self._heard_s: float | None = None
         stream.subscribe(self._hear)
 
@@ -62,7 +62,7 @@ class LoggerLearning:
         """Not the bytes: the stream's consumer takes what is made of them."""
 
     def tick(self) -> None:
-        """Nothing to do: a solve is told by the stream's own time."""
+        """Nothing to do: a solve is printed by the stream's own time."""
 
     def as_json(self) -> dict[str, Any]:
         """Return the newest estimates.
@@ -70,23 +70,23 @@ class LoggerLearning:
         Returns
         -------
         dict
-            ``card``: whether the stream told of a flight card; ``age_s`` since the last estimate,
+            ``card``: whether the stream named a flight card; ``age_s`` since the last estimate,
             None before one; ``rows``: of each derivative ``name``, ``axis``, ``row`` of the card
             (from 1), ``after_s`` since its trigger, ``t_s``, ``value`` and ``half_width`` (None:
-            not told), ``percent`` of the value, ``enough``, and the ``ground`` figure: value and
-            half-width, or None.
+            not estimated), ``percent`` of the value, ``enough``, and the ``ground`` figure: value
+            and half-width, or None.
         """
         return {
             "card": self._card,
             "age_s": None if self._heard_s is None else round(self._clock() - self._heard_s, 1),
-            "rows": [self._beside(row) for row in self._rows.values()],
+            "rows": [self._compared(row) for row in self._rows.values()],
         }
 
     def close(self) -> None:
         """Tell what was heard of a last solve."""
         self._end_solve()
 
-    def _beside(self, row: dict[str, Any]) -> dict[str, Any]:
+    def _compared(self, row: dict[str, Any]) -> dict[str, Any]:
         ground = self.ground(row["name"])
         figure = None if ground is None else {"value": ground[0], "half_width": ground[1]}
         return row | {"ground": figure}
@@ -134,14 +134,14 @@ class LoggerLearning:
         self._card, self._heard_s = True, self._clock()
         self._solved.append(row)
         self._rows[name] = row
-        self.show(self._beside(row))
+        self.show(self._compared(row))
 
     def _end_solve(self) -> None:
         """Tell a solve in one line."""
         solved, self._solved = self._solved, []
         if not solved:
             return
-        parts = [_in_words(self._beside(row)) for row in solved]
+        parts = [_in_words(self._compared(row)) for row in solved]
         first = solved[0]
         self._tell(f"the logger, row {first['row']}, {first['after_s']:.1f} s: {', '.join(parts)}")
 
@@ -149,7 +149,7 @@ class LoggerLearning:
 def _in_words(row: dict[str, Any]) -> str:
     """Return one derivative as the terminal shows it."""
     if row["half_width"] is None:
-        return f"{row['name']} not told"
+        return f"{row['name']} not estimated"
     said = f"{row['name']} {row['value']:.4g} +- {row['half_width']:.2g}"
     ground = row["ground"]
     if ground is not None:

@@ -17,7 +17,7 @@ from host.live.ground_capture import GroundCapture
 from host.live.live_sources import Source
 
 _MOST_BYTES = 1 << 24  # on the way to who shows: three quarters of an hour of the radio
-_PORTION_BYTES = 100  # what an object takes beside its bytes
+_PORTION_BYTES = 100  # what an object takes besides its bytes
 _STILL_S = 3.0  # a source yields at least ten times a second, in silence too
 _WAIT_S = 0.02
 _LEAVE_S = 5.0
@@ -33,7 +33,7 @@ class Portion:
 
 
 class Recorder:
-    """Listens to a source until it ends or is told to stop.
+    """Listens to a source until it ends or is stopped.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ class RecordingWatch:
         self.say: Callable[[str], None] = lambda message: None
         self._session = session
         self._tell = tell
-        self._told = ""
+        self._reported = ""
         self._said: tuple[float, str] | None = None
 
     def look(self) -> None:
@@ -43,9 +43,9 @@ class RecordingWatch:
         now_s = time.monotonic()
         trouble = self._trouble(now_s)
         kind = trouble.partition(" for ")[0]  # without its seconds
-        if kind and kind != self._told:
+        if kind and kind != self._reported:
             self._tell(trouble)
-        self._told = kind
+        self._reported = kind
         if self._said is not None and now_s - self._said[0] < BEAT_S and kind == self._said[1]:
             return
         self._said = now_s, kind

@@ -25,19 +25,19 @@ class RequestNoise(logging.Handler):
     ) -> None:
         super().__init__()
         self._tell, self._clock = tell, clock
-        self._told_s: float | None = None
+        self._reported_s: float | None = None
         self._more = 0
 
     def emit(self, record: logging.LogRecord) -> None:
         """Tell of it, or count it."""
         now_s = self._clock()
-        if self._told_s is not None and now_s - self._told_s < _EVERY_S:
+        if self._reported_s is not None and now_s - self._reported_s < _EVERY_S:
             self._more += 1
             return
         kind = record.exc_info[0] if record.exc_info else None
         what = kind.__name__ if kind is not None else record.levelname.lower()
         more = f", and {self._more} more since the last such line" if self._more else ""
-        self._told_s, self._more = now_s, 0
+        self._reported_s, self._more = now_s, 0
         self._tell(f"page: a request that is none was refused ({what}){more}")
 
 

@@ -26,7 +26,7 @@ def slow_reading(schema: Schema, frame: SlowFrame) -> dict[str, Any]:
     -------
     dict
         By field; bits as a list of names, text without its padding. A `system` frame has `rail_v`
-        and `supply_v` beside.
+        and `supply_v` too.
     """
     raw = frame.row.item()
     out = {name: read(raw[at]) for at, name, read in _readers(_Kept(schema), frame.name)}

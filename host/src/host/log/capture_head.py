@@ -1,6 +1,6 @@
-"""Notes of a ground station beside the bytes it receives: one JSON object per line.
+"""Notes of a ground station on the bytes it receives: one JSON object per line.
 
-The bytes stay as they came (`NAME.radio`); `NAME.radio.jsonl` beside them begins with the head and
+The bytes stay as they came (`NAME.radio`); `NAME.radio.jsonl` next to them begins with the head and
 goes on with events: marks, resets of the line, unknown schema hashes. host/LIVE.md has the table.
 The bytes alone decode too; only the events are then lost.
 """

@@ -229,7 +229,7 @@ def _curve(path: Path, name: str, value: Any, axes: int) -> tuple[float, ...]:
         return ()
     if not isinstance(value, list) or len(value) != _CURVE or axes != 1:
         raise CalibrationError(
-            f"{path}: [{name}] curve is {shown(value)}, expected two numbers beside one zero"
+            f"{path}: [{name}] curve is {shown(value)}, expected two numbers with one zero"
         )
     where = f"{path}: [{name}] curve"
     return tuple(_RANGES["curve"].check(where, one, CalibrationError) for one in value)

@@ -1,4 +1,4 @@
-"""What a movement of the surfaces tells of this aircraft, before anybody looks at its response.
+"""What a movement of the surfaces says of this aircraft, before anybody looks at its response.
 
 The aircraft file's linear model turns the movement into motion; the information of that motion
 about each derivative is that of a regression (Klein & Morelli, Aircraft System Identification,

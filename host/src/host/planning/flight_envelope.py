@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Envelope:
-    """What ends an input, beside sticks, switch and the recorder's health.
+    """What ends an input, besides sticks, switch and the recorder's health.
 
     A value on a limit is inside. Defaults are those of a trainer's first flights.
     """

@@ -67,7 +67,7 @@ def with_models(
     models : sequence of Path
         Models as `host identify --save-model` writes them, of one airspeed.
     draw : Generator, optional
-        Draws every parameter from the 95 % interval beside it; none changes its sign.
+        Draws every parameter from the 95 % interval of it; none changes its sign.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What the logger is told to learn an axis in flight: gains, delays, what stays unknown.
+"""What the logger is given to learn an axis in flight: gains, delays, what stays unknown.
 
 The logger's sums are of raw counts. What a ratio of counts is worth, how late each sensor is and
 how far the instrument may be wrong is reckoned here, before the flight, for one airspeed.

@@ -4,7 +4,7 @@ A half-width has two parts. Tolerances of instrument and aircraft stay, whatever
 and gusts leave the other, which shrinks with information. How much information a point adds is
 known before it is flown, from the aircraft file's linear model (`aircraft_response`); how much
 noise there is, the estimate of what was flown says. So the width after one more point is that
-noise, times the ratio of two deviations, beside the tolerance. The point that takes most of the
+noise, times the ratio of two deviations, with the tolerance. The point that takes most of the
 excess over the wanted widths in a second of flight is the next one.
 """
 
@@ -28,7 +28,7 @@ AXES = ("elevator", "aileron", "rudder")
 KINDS = {"3211": (1.0,), "doublet": (1.0, 1.7)}  # units of `mode_widths_s`
 MOST_AHEAD = 12  # points looked ahead
 INPUT_NAMES = {"3211": "3-2-1-1"}
-# Which axis tells of a derivative that nothing is known of yet.
+# Which axis informs a derivative that nothing is known of yet.
 EXCITING_AXIS = {
     "CL_alpha": "elevator", "Cm_alpha": "elevator", "Cm_q": "elevator", "Cm_de": "elevator",
     "Cl_p": "aileron", "Cl_da": "aileron",
@@ -216,7 +216,7 @@ class NextPoints:
 
 
 def _for_a_hand(s: Segment) -> Segment:
-    """Return a point with amplitudes that a pilot can be told: whole tenths of a degree."""
+    """Return a point with amplitudes that a pilot can read: whole tenths of a degree."""
     return replace(s, amplitudes=tuple(max(math.floor(10.0 * a) / 10.0, 0.1) for a in s.amplitudes))
 
 

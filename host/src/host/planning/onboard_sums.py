@@ -50,7 +50,7 @@ class AxisCard:
     tolerance : tuple of float
         Half-widths that the instrument leaves, in the derivatives' units.
     wanted_percent : tuple of int
-        Half-width that is enough, per cent of the estimate; 0: this one is not told.
+        Half-width that is enough, per cent of the estimate; 0: this one is not sent.
     """
 
     axis: str

@@ -7,7 +7,7 @@ with every tolerance, and identified as a real flight of it would be.
 By the estimator that flies along (`host live`, equation error with the instrument's errors): of one
 point its half-widths repeat within a fifth from flight to flight, those of the default linear
 method within a factor of two (`studies/point_verdicts.md`), and no verdict tells luck. Roll's
-equation needs an aileron: a rudder alone is told by those of side force and yaw.
+equation needs an aileron: a rudder alone informs those of side force and yaw.
 """
 
 from __future__ import annotations
@@ -155,7 +155,7 @@ def identify_single_point(
 
 
 def _model_of(point: Segment) -> CoefficientModel:
-    """Return the equations that a point tells of: a rudder alone hardly rolls."""
+    """Return the equations that a point informs: a rudder alone hardly rolls."""
     model = standard_model()
     if point.axes != ("rudder",):
         return model

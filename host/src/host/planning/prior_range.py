@@ -2,7 +2,7 @@
 
 A design that is best for the nominal aircraft may tell little of the one that flies: it is made
 for, and judged on, aircraft drawn from the prior's range. How far a coefficient may be off is
-said by the 95 % interval that identification wrote beside it (`host identify --save-aircraft`),
+said by the 95 % interval that identification wrote with it (`host identify --save-aircraft`),
 else by its kind: handbook methods and vortex lattices of conventional aircraft are 10 to 30 % off
 (Roskam, Airplane Design, part VI; Klein & Morelli, Aircraft System Identification, ch. 5).
 """

@@ -62,7 +62,7 @@ def _optimal(tables: Sequence[ToneTable], block: str, allowed: BoolArray) -> Arr
     information = np.array([t.information[allowed] for t in tables])
     value = np.array([t.value for t in tables])
     # Weight of a tone: its share of the mean-square excursion that its surface may make. In one
-    # budget for both the rudder takes all, and roll is told worst: rolling gusts are the strongest.
+    # budget for both the rudder takes all, and roll is worst: rolling gusts are the strongest.
     axes = [tables[0].axis[allowed] == k for k in np.unique(tables[0].axis)]
     share = np.ones(len(cost))
     for _ in range(ITERATIONS):

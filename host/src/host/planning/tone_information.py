@@ -1,4 +1,4 @@
-"""What one sine on one surface tells of an aircraft in gusts, and how far it moves it.
+"""What one sine on one surface says of an aircraft in gusts, and how far it moves it.
 
 Each moment equation is a regression in the frequency domain: a tone of amplitude a over T seconds
 adds ``a^2 T Re(G G*) / S`` to the information on the derivatives of a row, with G what the row's

@@ -13,7 +13,7 @@ from host.preflight.check_list import CheckListInputs, check_list
 from host.preflight.load_checks import RadioCheck
 from host.preflight.sample import Sample, SlowReading, in_order
 
-_HINT_S = 8.0  # time without success after which the pilot is told the progress so far
+_HINT_S = 8.0  # time without success after which the pilot sees the progress so far
 _REST_S = 1.0  # pause after a motion that failed early, before the next one is looked for
 STILL = ("imu", "gyros", "airspeed_rest")  # before anything is asked to move
 

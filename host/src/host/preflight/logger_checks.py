@@ -110,7 +110,7 @@ class ReceiverCheck(Check):
             return
         self.values["glitches_per_s"] = rate
         if rate > self.limit["glitches_per_s"]:
-            self.fail_check(f"{rate:.0f} wrong pulses a second: a loose lead, or noise beside it")
+            self.fail_check(f"{rate:.0f} wrong pulses a second: a loose lead, or noise near it")
         else:
             self.pass_check()
 
@@ -123,7 +123,7 @@ class ReceiverCheck(Check):
             "receiver refused",
         ):
             word = "a storm of edges" if "storm" in reading.said["code"] else "pulses of no servo"
-            self._odd = f"{word} on its lines: a loose lead, or noise beside it"
+            self._odd = f"{word} on its lines: a loose lead, or noise near it"
             self.fail_check(self._odd)
 
     def missing(self) -> str:

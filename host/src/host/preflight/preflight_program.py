@@ -40,7 +40,7 @@ class PreflightRequest:
     without : dict of str to str
         Items or parts left out, and why.
     sheet : Path or None
-        Beside the capture, or in the working folder, without it.
+        Next to the capture, or in the working folder, without it.
     as_json : bool
     flight_card : Path or None
         The logger's card: its hold is looked at.
@@ -190,7 +190,7 @@ class _Walk:
 
 
 def _sheet_path(session: LiveSession) -> Path:
-    """Return the sheet's place: beside the capture, else in the working folder."""
+    """Return the sheet's place: next to the capture, else in the working folder."""
     if session.capture is not None:
         return session.capture.path.with_suffix(SUFFIX)
     return Path(datetime.now().strftime("PREFLIGHT-%Y%m%d-%H%M%S.toml"))

@@ -96,8 +96,8 @@ def write_sheet(path: Path, document: dict[str, Any]) -> None:
         part.write_text(dumps(document), encoding="utf-8")
 
 
-def sheet_beside(log: Path) -> Path | None:
-    """Return the sheet beside a log or capture, None if there is none."""
+def sheet_of(log: Path) -> Path | None:
+    """Return the sheet next to a log or capture, None if there is none."""
     path = log.with_suffix(SUFFIX)
     return path if log.suffix and path.is_file() else None
 
@@ -170,9 +170,9 @@ def shown_sheet(path: Path) -> Join:
         session.state.say("preflight", f"{'GO' if sheet.go else 'NO-GO'}: {path.name}")
         text = read_text(path, UsageError)
         session.note("preflight_sheet", go=sheet.go, sheet=text)
-        beside = session.capture.path.with_suffix(SUFFIX) if session.capture else path
-        if not beside.exists():  # the flight's log has its own
-            beside.write_text(text, encoding="utf-8")
+        near = session.capture.path.with_suffix(SUFFIX) if session.capture else path
+        if not near.exists():  # the flight's log has its own
+            near.write_text(text, encoding="utf-8")
         return lambda: None
 
     return join

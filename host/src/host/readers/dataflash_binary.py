@@ -27,7 +27,7 @@ from host.export.dataflash_layout import (
 )
 
 LARGEST_UINT32 = 1 << 32
-_CHUNK_BYTES = 32 << 20  # read at a time: what a log needs beside the places of its records
+_CHUNK_BYTES = 32 << 20  # read at a time: what a log needs besides the places of its records
 Progress = Callable[[int, int], None]
 
 

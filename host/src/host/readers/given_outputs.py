@@ -16,7 +16,7 @@ from host.readers.px4_outputs import TYPES
 from host.readers.px4_pulses import FIRST_SERVO, GROUPS
 from host.readers.written_parameters import Parameters
 
-OUTPUT = "output "  # of a choice, with the number behind it, beside the messages of sensors
+OUTPUT = "output "  # of a choice, with the number behind it, among the messages of sensors
 OUTPUT_FIELDS = (
     *((name, 1, re.compile(r"C(\d+)")) for name in ("RCOU", "RCO2", "RCO3")),
     ("SERVO_OUTPUT_RAW", 1, re.compile(r"servo(\d+)_raw")),

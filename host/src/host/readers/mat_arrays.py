@@ -89,7 +89,7 @@ class _Arrays:
     depth: int = 0
 
     def variables(self, data: memoryview) -> Iterator[tuple[str, Value]]:
-        """Yield what stands side by side."""
+        """Yield names and values of neighbouring elements."""
         while len(data):
             kind, part, data = self.element(data, padded=False)
             if kind == _COMPRESSED:

@@ -1,6 +1,6 @@
 """Parquet by its own schema: rows and widths are asked for before anything is read.
 
-What pandas wrote beside the columns (its index, its types) is a text of whoever made the file, and
+What pandas wrote besides the columns (its index, its types) is a text of whoever made the file, and
 is not followed.
 """
 

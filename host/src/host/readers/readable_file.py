@@ -18,7 +18,7 @@ BLACKBOX = (
     " {stem}.01.csv --map mine.toml`; what a map says of the outputs: host/LOGS.md"
 )
 EXCEL = "an Excel workbook; `libreoffice --headless --convert-to csv {name}`"
-# How a file begins, or what stands in its head, and what turns it into one that is read.
+# How a file begins, or what its head holds, and what turns it into one that is read.
 KINDS: tuple[tuple[bytes, bool, str], ...] = (
     (b"H Product:Blackbox", False, BLACKBOX),
     (b"\x89MCAP0\r\n", True, "an MCAP recording; `mcap cat {name} --topics /TOPIC --format=ndjson >"

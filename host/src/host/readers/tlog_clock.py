@@ -14,7 +14,7 @@ from host.readers.clock_epochs import clock_sets
 Fields = dict[str, NDArray[Any]]
 WRAP_US = float(1 << 32)
 OTHER_CLOCK_S = 1e9  # a time since boot is shorter than thirty years
-STAMP = "received_s"  # of the ground station, beside a message's own fields
+STAMP = "received_s"  # of the ground station, besides a message's own fields
 PLACE = "place"  # of a message's frame in the log
 BOTH_CLOCKS = "ATTITUDE"  # has both clocks, so it dates the autopilot's start
 

@@ -38,7 +38,7 @@ SAID = ("sys_name", "ver_sw_branch", "ver_hw")
 
 
 class UnknownFlagsError(ValueError):
-    """A log whose flags say that it is to be read in a way that nobody told us."""
+    """A log whose flags say that it is to be read in a way that is not known here."""
 
 
 @dataclass(slots=True)

@@ -262,8 +262,10 @@ def _common_rows(columns: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def _found_in(path: Path, wanted: FlightRequest) -> tuple[Maneuvers, list[str]]:
-    """Return the test points of a source whose sensors are slow, and drop out: what stands still
-    counts as missing there, as in `host maneuvers`."""
+    """Return the test points of a source whose sensors are slow, and drop out.
+
+    A column that stands still counts as missing there, as in `host maneuvers`.
+    """
     try:
         source = with_flight(path, wanted.session)
         found, _ = read_columns(

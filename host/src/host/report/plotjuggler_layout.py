@@ -18,7 +18,7 @@ PREFIX = {"ulog": "flight_test/", "mcap": "/flight/"}
 
 
 def write_layout(flight: ShownFlight, path: Path, kind: str) -> None:
-    """Write a layout beside an exported file; curves in degrees, as our page has them.
+    """Write a layout next to an exported file; curves in degrees, as our page has them.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ from host.sysid.answer.mat_file import labels
 if TYPE_CHECKING:
     from host.sysid.pipeline import Identification
 
-_BESIDE = "beside"  # file of the second method's numbers in the page
+_SECOND = "second"  # file of the second method's numbers in the page
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class ReportParts:
     Attributes
     ----------
     found : Identification
-    beside : Identification or None
+    second : Identification or None
         The same flights by a second method, for comparison only: no verdict is given of it.
     flights : list of ShownFlight
         Of the sources that are logs.
@@ -66,7 +66,7 @@ class ReportParts:
     command: str
     sheet: tuple[str, list[str]] | None = None
     calibrations: dict[str, str] = field(default_factory=dict)
-    beside: Identification | None = None
+    second: Identification | None = None
     gains: str = ""
 
 
@@ -81,8 +81,8 @@ def report_page(parts: ReportParts) -> str:
     titles = _titles(numbers)
     figures = found.plot()
     cards = maneuver_cards(parts.flights, numbers.document["answers"])
-    others = parts.beside.to_json() if parts.beside else ""
-    beside = [JsonNumbers(json.loads(others), _BESIDE)] if others else []
+    others = parts.second.to_json() if parts.second else ""
+    second = [JsonNumbers(json.loads(others), _SECOND)] if others else []
     models = [answer["template"] for answer in numbers.document["answers"]]
     inputs = {  # the first method's: those of the others are the same
         f"{label}_input": f"{model}: spectra of the inputs"
@@ -126,13 +126,13 @@ def report_page(parts: ReportParts) -> str:
             f"<h4>{escaped(titles[at])}</h4>{fit_table(numbers, at)}" for at in range(len(called))
         )),
         _folded("Spectra of the inputs", _pictures(figures, inputs)),
-        _folded("Methods side by side", _methods(numbers, beside)),
+        _folded("Methods side by side", _methods(numbers, second)),
         _folded("Sensor agreement", sensor_agreement(numbers)),
         _folded("Data health", data_health(parts.flights, sources)),
         _folded("Calibration and preflight",
                 calibration_and_preflight(parts.flights, parts.calibrations, parts.sheet)),
         _folded("Command, versions, files",
-                _appendix(parts, {"result": text} | ({_BESIDE: others} if others else {}))),
+                _appendix(parts, {"result": text} | ({_SECOND: others} if others else {}))),
         "</section>",
     ]  # fmt: skip
     return HtmlPage(
@@ -165,9 +165,9 @@ def _simulated(parts: ReportParts) -> str:
     return '<p class="facts"><strong>Simulated: this aircraft was not flown.</strong></p>'
 
 
-def _methods(numbers: JsonNumbers, beside: list[JsonNumbers]) -> str:
-    said = method_comparison(numbers, *beside)
-    if not said or not beside:
+def _methods(numbers: JsonNumbers, second: list[JsonNumbers]) -> str:
+    said = method_comparison(numbers, *second)
+    if not said or not second:
         return said
     return (
         "<p>Equation error is a regression: it needs no search and no start value, and noise in"
@@ -193,8 +193,8 @@ def _data_lines(flights: Sequence[ShownFlight]) -> str:
     for flight in flights:
         lost = len(flight.summary["losses"]["ranges"])
         losses = f"{lost} lost range{'s' * (lost > 1)}" if lost else "nothing lost"
-        told = f"{flight.name}: {flight.summary['duration_s']:.0f} s, {losses}"
-        said.append(f'<p class="facts">{escaped(told)}</p>')
+        line = f"{flight.name}: {flight.summary['duration_s']:.0f} s, {losses}"
+        said.append(f'<p class="facts">{escaped(line)}</p>')
     return "".join(said)
 
 

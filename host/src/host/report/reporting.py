@@ -12,7 +12,7 @@ from host.aircraft.prior.aircraft_prior import has_coefficients
 from host.errors import HostError, IdentificationError, UsageError
 from host.files.user_text import read_text
 from host.original.rows import looks_like_rows
-from host.preflight.preflight_sheet import sheet_beside, sheet_lines
+from host.preflight.preflight_sheet import sheet_lines, sheet_of
 from host.readers.autopilot_flight import is_autopilot_log
 from host.readers.flight_choice import file_and_flight
 from host.readers.foreign_tables import TEXT_KINDS
@@ -28,7 +28,7 @@ from host.sysid.pipeline import identify
 if TYPE_CHECKING:
     from host.sysid.pipeline import Identification
 
-BESIDE = "equation-error"
+_SECOND_METHOD = "equation-error"
 _HEAD_BYTES = 4096
 
 
@@ -77,13 +77,13 @@ def write_report(request: ReportRequest) -> tuple[Path, Identification]:
         target = _not_there_yet(target)
     if any(target.exists() and target.samefile(one) for one in files):
         raise UsageError(f"{target} is the source itself; name another file with -o")
-    sheet = _sheet(request.preflight or sheet_beside(first))
+    sheet = _sheet(request.preflight or sheet_of(first))
     options = dict(request.options)
     if options.get("prior") is None and options.get("aircraft") is not None:
         own = options["aircraft"]
         options["prior"] = own if has_coefficients(own) else None
     found = identify(request.sources, **options)
-    beside = None if options.get("methods") else _second_method(request.sources, options, found)
+    second = None if options.get("methods") else _second_method(request.sources, options, found)
     flights = [
         flight
         for source, calibration in zip(request.sources, request.calibrations, strict=True)
@@ -93,7 +93,7 @@ def write_report(request: ReportRequest) -> tuple[Path, Identification]:
     others = [one for one in request.files if one not in calibrations]
     parts = ReportParts(
         found=found,
-        beside=beside,
+        second=second,
         flights=flights,
         aircraft=str(aircraft or ""),
         versions=versions(),
@@ -119,7 +119,7 @@ def _not_there_yet(path: Path) -> Path:
 def _second_method(
     sources: list[Path], options: Mapping[str, Any], found: Identification
 ) -> Identification | None:
-    """Return the same flights by a second method, to stand beside the first; None if it has none.
+    """Return the same flights by a second method, to compare with the first; None if it has none.
 
     A regression shares no search and no start value with the methods that fit histories, and takes
     a second.
@@ -127,7 +127,7 @@ def _second_method(
     if not found.linear:
         return None
     try:
-        return identify(sources, **{**options, "methods": [BESIDE]})
+        return identify(sources, **{**options, "methods": [_SECOND_METHOD]})
     except IdentificationError:
         return None
 

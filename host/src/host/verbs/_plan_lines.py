@@ -85,7 +85,7 @@ def _remedy(width: PredictedWidth | None) -> str:
 
 
 def print_intervals(plan: Plan, prediction: Prediction | None) -> None:
-    """Print what identification will state, beside the bound of white noise."""
+    """Print what identification will state, and the bound of white noise."""
     least = {b.name: b for b in plan.bounds}
     widths = {w.name: w for w in prediction.widths} if prediction is not None else {}
     rows: list[tuple[str, float, float, float, Bound | None]]

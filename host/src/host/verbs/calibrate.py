@@ -63,7 +63,7 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--temperature", type=float, metavar="DEGC", help="air on the bench")
     _add_bench_options(parser)
-    parser.add_argument("--picture", type=Path, metavar="SVG", help="default: beside the file")
+    parser.add_argument("--picture", type=Path, metavar="SVG", help="default: next to the file")
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 

@@ -16,7 +16,7 @@ zsh:  host completion zsh > a folder of $fpath/_host
 fish: host completion fish > ~/.config/fish/completions/host.fish
 PowerShell: host completion powershell >> $PROFILE
 """
-# What the names of an option are, beside files: option or positional -> kind of name.
+# What the names of an option are, besides files: option or positional -> kind of name.
 NAMED = {
     "aircraft": "aircraft", "card": "card", "method": "method", "model": "model",
     "map": "map",

@@ -12,7 +12,7 @@ from host.verbs.plot import flight_request
 _KINDS = ("tlog", "ulog", "kml", "kmz", "gpx", "mcap")
 _DESCRIPTION = """\
 Write a flight for other programs: tlog (Mission Planner, QGroundControl, MAVExplorer),
-ulog and mcap (PlotJuggler, Foxglove; a layout for PlotJuggler stands beside), kml and kmz
+ulog and mcap (PlotJuggler, Foxglove; a layout for PlotJuggler comes along), kml and kmz
 (Google Earth), gpx (maps). Tables are written by `host decode --to csv|parquet|mat|npz`.
 """
 _EPILOG = """\

@@ -26,7 +26,7 @@ def add_parser(subparsers: Any) -> None:
         help="run a saved model over another record",
         description="Run a model of `host identify --save-model` over records it has not seen:"
         " derivatives held, only biases and start states fitted. Says the error in free"
-        " simulation, one step ahead, and over windows beside that of kinematic persistence.",
+        " simulation, one step ahead, and over windows against that of kinematic persistence.",
     )
     parser.add_files("model of `host identify --save-model`, or yours; then records: log, CSV,"
                      " Parquet, MAT, without one the newest flight of the working folder. --from"

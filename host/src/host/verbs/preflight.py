@@ -19,7 +19,7 @@ SOURCE is what `host live` takes (radio's port, udp:PORT, a recording), the Mega
 """
 _EPILOG = """\
 While it runs: Enter goes on where nothing is seen (the item stays red), the name of an item looks
-at it again, q ends. The sheet lies beside the capture, as TOML. More: host/PREFLIGHT.md
+at it again, q ends. The sheet lies by the capture, as TOML. More: host/PREFLIGHT.md
 exit codes: 0 GO, 2 usage, 5 no radio, or its port is busy or gone, 6 NO-GO
 """
 
@@ -48,7 +48,7 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--list", action="store_true", help="print the checks, and stop")
     parser.add_argument("--sheet", type=Path, metavar="TOML",
-                        help="sheet to write (default: beside the capture)")  # fmt: skip
+                        help="sheet to write (default: next to the capture)")  # fmt: skip
     parser.add_argument("-o", "--output", type=Path, metavar="PATH",
                         help="capture's file or folder (default: the working folder)")  # fmt: skip
     parser.add_argument("--baud", type=int, metavar="N",

@@ -59,7 +59,7 @@ def add_parser(subparsers: Any) -> None:
         "--preflight",
         type=Path,
         metavar="FILE",
-        help="sheet of `host preflight`; the one beside the log (NAME.preflight.toml) without it",
+        help="sheet of `host preflight`; the one next to the log (NAME.preflight.toml) without it",
     )
     _add_answer_arguments(parser)
 
@@ -72,14 +72,14 @@ def _add_answer_arguments(parser: argparse.ArgumentParser) -> None:
         "--method",
         action="append",
         metavar="NAME",
-        help="as of `host identify`; several stand side by side; equation error beside the default"
+        help="as of `host identify`; several stand side by side; equation error joins the default"
         " one without it",
     )
     parser.add_argument(
         "--prior",
         type=Path,
         metavar="FILE",
-        help="coefficients to set beside them: TOML, AVL, Datcom, an aircraft; those of --aircraft"
+        help="coefficients to compare with: TOML, AVL, Datcom, an aircraft; those of --aircraft"
         " without it",
     )
     parser.add_argument(

@@ -19,7 +19,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "simulate",
         help="fly a virtual flight test and record it",
         description="Fly a flight card with a simulated aircraft, air, pilot and sensors. Writes"
-        " the log, the truth beside it, the calibration that belongs to it, and a picture."
+        " the log, its truth, the calibration that belongs to it, and a picture."
         " Without a card it lists the cards.",
     )
     parser.add_argument("card", nargs="?", help="name of a card, or a TOML file")

@@ -38,7 +38,7 @@ def add_parser(subparsers: Any) -> None:
                         help="airspeed that the gains hold at; repeatable (default: least, trim"
                         " and largest of the aircraft file)")  # fmt: skip
     parser.add_argument("--save", type=Path, metavar="FILE",
-                        help="write changed parameters as FILE, the old ones beside it as"
+                        help="write changed parameters as FILE, the old ones as"
                         " FILE-before")  # fmt: skip
     parser.add_argument("--plots", type=Path, metavar="DIR",
                         help="write a picture of each axis")  # fmt: skip

@@ -93,7 +93,7 @@ def read_stream(path: Path, *, texts: Collection[bytes] = (), limit_bytes: int =
     ----------
     path : Path
     texts : collection of bytes
-        Schemas known beside the released ones, such as that of a capture's head.
+        Schemas known besides the released ones, such as that of a capture's head.
     limit_bytes : int
         Look at the head of the file only.
 

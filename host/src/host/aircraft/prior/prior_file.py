@@ -6,7 +6,7 @@ each may be a list, a table over the angle of attack; `[half_width]` their 95 % 
 or Digital Datcom's output (`datcom`). Tables are read between their rows at the flight's angle of
 attack, lateral derivatives turned from stability to body axes there. Signs are the house's: body
 axes x forward, y right, z down; elevator and aileron as in the answer. Coefficients are referred
-to the file's own area, chord and span, which are printed beside them where the file has them. An
+to the file's own area, chord and span, which are printed with them where the file has them. An
 aircraft file or one of dimensions serves too: what it says before it is flown.
 """
 

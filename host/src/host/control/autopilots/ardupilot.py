@@ -152,8 +152,8 @@ def structure(axis: str, logged: Mapping[str, float], trim_mps: float) -> ArduPl
         )
     names = {key: name.format(PREFIX[axis]) for key, name in LOGGED.items()}
     fixed = parameter_table.fixed("ardupilot", names, logged)
-    told = parameter_table.assumed("ardupilot", names, logged)
-    return ArduPlane(axis, fixed, trim_mps, mixer_share(axis, logged), assumed=told)
+    assumed = parameter_table.assumed("ardupilot", names, logged)
+    return ArduPlane(axis, fixed, trim_mps, mixer_share(axis, logged), assumed=assumed)
 
 
 def mixer_share(axis: str, logged: Mapping[str, float]) -> float:

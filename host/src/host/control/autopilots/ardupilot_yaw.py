@@ -1,4 +1,4 @@
-"""ArduPlane's rudder: yaw damper and aileron's share, beside the roll loop.
+"""ArduPlane's rudder: yaw damper and aileron's share, next to the roll loop.
 
 Law: APM_Control/AP_YawController.cpp, ArduPlane/Attitude.cpp (4.7-dev 2598e9d). YAW2SRV_INT and
 YAW2SRV_SLIP stay 0, YAW2SRV_RLL 1, as they are by default.

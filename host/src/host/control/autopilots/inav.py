@@ -141,5 +141,5 @@ def structure(axis: str, logged: Mapping[str, float], trim_mps: float) -> Inav:
         fixed["integral_percent"] /= 5.0  # of 500, up to release 7
     if logged.get("looptime", 0.0) > 0.0:
         fixed["loop_hz"] = 1e6 / logged["looptime"]
-    told = parameter_table.assumed("inav", {**LOGGED, "loop_hz": "looptime"}, logged)
-    return Inav(axis, fixed, trim_mps, assumed=told)
+    assumed = parameter_table.assumed("inav", {**LOGGED, "loop_hz": "looptime"}, logged)
+    return Inav(axis, fixed, trim_mps, assumed=assumed)

@@ -1,4 +1,4 @@
-"""The file beside an autopilot's law: its parameters, their ranges, what its modes are called."""
+"""The file of an autopilot's law: its parameters, their ranges, what its modes are called."""
 
 from __future__ import annotations
 

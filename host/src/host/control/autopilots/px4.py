@@ -121,5 +121,5 @@ def structure(axis: str, logged: Mapping[str, float], trim_mps: float) -> Px4:
     name, usual = INTEGRAL_LIMITS[axis]
     fixed = parameter_table.fixed("px4", LOGGED, logged)
     fixed["integral_torque"] = logged.get(name, usual)
-    told = parameter_table.assumed("px4", {**LOGGED, "integral_torque": name}, logged)
-    return Px4(axis, fixed, share_per_torque(axis, logged), trim_mps, assumed=told)
+    assumed = parameter_table.assumed("px4", {**LOGGED, "integral_torque": name}, logged)
+    return Px4(axis, fixed, share_per_torque(axis, logged), trim_mps, assumed=assumed)

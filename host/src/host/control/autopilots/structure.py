@@ -74,7 +74,7 @@ class Structure(Protocol):
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """Names of parameters that stay and that nobody told: defaults stand for them."""
+        """Names of parameters that stay and that nobody gave: defaults stand for them."""
 
     @property
     def searched(self) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""What axes and rudders of every law have alike: parameters of the file beside it, and of a log."""
+"""What axes and rudders of every law have alike: parameters of its file, and of a log."""
 
 from __future__ import annotations
 

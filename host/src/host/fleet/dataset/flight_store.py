@@ -1,7 +1,7 @@
 """Rows of flights on disk: whenever a run is stopped, each is whole or absent, none twice.
 
 A new row is a file of its own in `new/`, under its key. `compact` moves rows into
-`flights/type=T/aircraft=A/month=M/flights.parquet`: a partition's file is written beside and takes
+`flights/type=T/aircraft=A/month=M/flights.parquet`: a partition's file is written apart and takes
 the old one's place in one step; only then the new rows are deleted. If a run is stopped in
 between, the next one drops the rows in `new/` that a partition already has.
 """

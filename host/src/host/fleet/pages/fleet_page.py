@@ -49,7 +49,7 @@ def fleet_page(model: TypeModel, found: list[AircraftHistory], rows: pd.DataFram
         f'<div class="verdict"><h2>What has changed</h2>{items(change_lines(found))}'
         f"<h2>What to fly to learn most</h2>{items(advice_lines(model))}</div>",
         _section("Mean and spreads", _effects(model)),
-        _section("Every flight beside the type", _funnels(model)),
+        _section("Every flight against the type", _funnels(model)),
         _section("Aircraft over their flights", _drifts(model, found)),
         _section("Aircraft", _aircraft(model, found)),
         _section("Flights set aside, and why", _aside(aside)),

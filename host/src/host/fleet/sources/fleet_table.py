@@ -116,5 +116,5 @@ def _plain(source: str) -> str:
 
 def _relative_to_table(table: Path, name: str) -> str:
     """Return a file's path from the table's folder, or a name that is no file there."""
-    beside = table.parent / name
-    return beside.as_posix() if name and beside.is_file() else name
+    near = table.parent / name
+    return near.as_posix() if name and near.is_file() else name

@@ -11,7 +11,7 @@ from typing import Any
 from host.extras import install_hint
 from host.fleet.fleet_error import FleetError
 
-# Found in folders; tables beside them may be what `host decode` made of a log.
+# Found in folders; tables next to them may be what `host decode` made of a log.
 LOGS = (".bin", ".log", ".ulg", ".ulog", ".tlog")
 _PIECE = 1 << 20
 _WILD = "*?["

@@ -268,15 +268,15 @@ def check_readable(theirs: dict[str, str]) -> None:
 
 
 def sample_files(tasks: Sequence[FlightTask]) -> list[str]:
-    """Return files to try: one log of each folder, and every file beside the logs."""
+    """Return files to try: one log of each folder, and every other file."""
     logs = {task.source.rpartition("/")[0]: task.source for task in tasks}
-    beside = {
+    others = {
         name
         for task in tasks
         for name in (task.aircraft_file, task.calibration, task.mapping)
         if name and Path(name).is_file()
     }
-    return [*list(logs.values())[:_MOST_TRIED], *sorted(beside)[:_MOST_TRIED]]
+    return [*list(logs.values())[:_MOST_TRIED], *sorted(others)[:_MOST_TRIED]]
 
 
 def unreadable(files: list[str]) -> str:

@@ -1,1 +1,1 @@
-"""Identification while flying: estimates as data come, beside the half-widths that are wanted."""
+"""Identification while flying: estimates as data come, against the half-widths that are wanted."""

@@ -115,7 +115,7 @@ def _estimate_for_ever(
             chosen = points.best(found.known, found.flown, wanted) if points else None
         except HostError as error:
             asked.send(_nothing(str(error), began))
-        except Exception as error:  # of ours: told, and the next portion is tried
+        except Exception as error:  # of ours: reported, and the next portion is tried
             asked.send(_nothing(f"internal error: {type(error).__name__}: {error}", began))
         else:
             asked.send(

@@ -31,7 +31,7 @@ from host.sysid.reconstruction.servo_response import surface_positions
 from host.twin.testcard.cards import Segment
 from host.twin.testcard.input_shapes import STEPS
 
-# What a surface does is told once it was flown: from a stick that was only held its interval held
+# What a surface does is known once it was flown: from a stick that was only held its interval held
 # the truth in 3 of 11.
 _AXIS_OF = {"de": "elevator_rad", "da": "aileron_rad", "dr": "rudder_rad"}
 _INPUT_S = 0.3  # shorter: a rest of one that a gap cut off
@@ -57,7 +57,7 @@ class FlightEstimate:
     flown : tuple of Segment
         The completed test points as they were flown.
     answer : CoefficientAnswer or None
-        All of it; None before anything can be told.
+        All of it; None before anything can be estimated.
     why_not : str
         Why there is none, or none of one axis.
     """

@@ -46,7 +46,7 @@ def live_estimates(
         In one line: no such aircraft, wrong widths.
     """
     percent = wanted_widths(wanted)
-    load_measured(aircraft)  # a misspelt name is told now, not in flight
+    load_measured(aircraft)  # a misspelt name is refused now, not in flight
     own = tempfile.TemporaryDirectory(prefix="host-live-")
     place = Path(own.name)
     if calibration:
@@ -139,7 +139,7 @@ class LiveEstimates:
         return not self._worker.busy and self._asked_size == self._size
 
     def as_json(self) -> dict[str, Any]:
-        """Return the newest estimates beside what is wanted, for page and JSON lines."""
+        """Return the newest estimates against what is wanted, for page and JSON lines."""
         last = self._last
         rows = [self._row(name, percent) for name, percent in self._wanted.items()]
         elapsed_s = self._clock() - self._began_s if self._began_s is not None else 0.0

@@ -6,7 +6,7 @@ const RIGHT = "#c43b00"; // right vane and pitot, servo, y axis
 const THIRD = "#00642c"; // z axis
 const FOURTH = "#6a1b9a";
 
-// What the pilot asks for and what the servo is told; where the surface stands is a strip of its own.
+// What the pilot asks for and what the servo gets; where the surface stands is a strip of its own.
 function pulses(name) {
   return {
     id: name,

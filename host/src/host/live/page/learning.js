@@ -1,4 +1,4 @@
-// What the logger estimates by itself while it flies a row, beside what is estimated here.
+// What the logger estimates by itself while it flies a row, and what is estimated here.
 
 const byId = (id) => document.getElementById(id);
 const OLD_S = 3; // it tells once a second
@@ -38,7 +38,7 @@ function words(said, old) {
   return old ? `${what}; ${said.age_s.toFixed(0)} s ago` : what;
 }
 
-// Shows nothing where the stream never told of a flight card; grey what was not told just now.
+// Shows nothing where the stream never named a flight card; grey what did not come just now.
 export function showLearning(said) {
   byId("logger-box").hidden = !said.card;
   const old = said.age_s === null || said.age_s > OLD_S;

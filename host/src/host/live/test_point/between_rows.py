@@ -1,7 +1,7 @@
 """Rows of the radio drawn to the rate of the card's log, by what the aircraft does between two.
 
 Twenty rows a second miss the edges of an input, and a burst of lost envelopes takes more. The
-card's aircraft, its servos and the pulses that they got tell of both: a smoother follows them from
+card's aircraft, its servos and the pulses that they got predict both: a smoother follows them from
 row to row, and a curve is drawn only through what it leaves of the rows.
 """
 

@@ -69,7 +69,7 @@ def finished_inputs(
             and share > (LEAST_SHARE if own else ATTEMPT_SHARE)
         ):
             found.append((not own, item))
-    # The wanted axis first: beside it others are handling.
+    # The wanted axis first: with it others are handling.
     return [item for _, item in sorted(found, key=lambda one: (one[0], one[1].start_s))]
 
 

@@ -89,7 +89,7 @@ class PointEstimator:
         return self._promised[point]
 
     def estimate(self, point: Segment, data: bytes, flown: DetectedManeuver) -> PointEstimate:
-        """Return what bytes tell of a point.
+        """Return what bytes say of a point.
 
         Without a promise where that was not reckoned yet.
 

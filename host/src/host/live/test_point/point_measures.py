@@ -1,4 +1,4 @@
-"""Numbers of one flown input beside those of the card's: what a verdict is made of."""
+"""Numbers of one flown input against those of the card's: what a verdict is made of."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _RATE_OF = {"elevator": "q_radps", "aileron": "p_radps", "rudder": "r_radps"}
 
 @dataclass(frozen=True, slots=True)
 class PointMeasures:
-    """What was flown, beside what was wanted.
+    """What was flown, and what was wanted.
 
     Attributes
     ----------

@@ -33,7 +33,7 @@ LOOKED_S = 0.5  # of the stream between two looks: a verdict is that late at mos
 EARLY_S, LATE_S = 1.5, 6.0  # of an input, against the countdown
 ANSWER_S = 1.0  # of the computer's clock: an estimate takes a fifth of it
 AHEAD_S = 10.0  # a recording played fast is held here until the answer is there
-MOST_BYTES = 1 << 17  # before a row has told the time: more than the radio sends in `KEPT_S`
+MOST_BYTES = 1 << 17  # before a row has the time: more than the radio sends in `KEPT_S`
 _SHOWN = 8
 
 
@@ -41,7 +41,7 @@ class EstimateSource(Protocol):
     """Who estimates a point, somewhere else."""
 
     def ask(self, point: Segment, data: bytes, flown: DetectedManeuver) -> None:
-        """Ask what bytes tell of a point; its input in seconds from their last row."""
+        """Ask what bytes say of a point; its input in seconds from their last row."""
         ...
 
     def answer(self, timeout_s: float = 0.0) -> PointEstimate | None:

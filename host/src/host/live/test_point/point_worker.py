@@ -43,7 +43,7 @@ class PointWorker:
         self._numbers, self._number = itertools.count(1), 0
 
     def ask(self, point: Segment, data: bytes, flown: DetectedManeuver) -> None:
-        """Ask what bytes tell of a point; its input in seconds from their last row.
+        """Ask what bytes say of a point; its input in seconds from their last row.
 
         The answer to an earlier question is forgotten. The bytes go by a file: a pipe takes 64 kB,
         and then waits for a process that may be busy.

@@ -95,8 +95,8 @@ class FlightRecord:
 
 
 # Gets the flight, filled as it is flown, and the additions (n, 3), us, that it is to fill. Returns
-# a function that is told how many steps are flown and says up to which to fly on.
-Beside = Callable[[FlightRecord, Array], Callable[[int], int]]
+# a function that gets how many steps are flown and says up to which to fly on.
+LoopedLogger = Callable[[FlightRecord, Array], Callable[[int], int]]
 
 
 def fly(
@@ -109,7 +109,7 @@ def fly(
     instrument_seed: int | None = None,
     noise_seed: int | None = None,
     added_us: Array | None = None,
-    beside: Beside | None = None,
+    logger: LoopedLogger | None = None,
 ) -> FlightRecord:
     """Fly a card.
 
@@ -132,9 +132,9 @@ def fly(
     added_us : (n, 3) array, optional
         What the logger adds to aileron, elevator and rudder at each step: it flies the inputs, of
         a card made by `flown_by_logger`. Of (0, 3): nothing yet.
-    beside : callable, optional
-        The logger in the same loop, of such a card that holds axes: see `Beside`. On the ground the
-        pilot tilts the aircraft.
+    logger : callable, optional
+        The logger in the same loop, of such a card that holds axes: see `LoopedLogger`. The
+        pilot tilts the aircraft on the ground.
 
     Returns
     -------
@@ -170,19 +170,19 @@ def fly(
     )
     wanted = card.flight.airspeed_mps or plane.scalar("trim.airspeed_mps")
     trim = solve(frame, wanted, density_kgpm3=density_kgpm3(atmosphere, card.flight.height_m))
-    by_logger = added_us is not None or beside is not None
-    plan = schedule(card, wanted, STEP_S, rng_pilot, by_logger=by_logger, holds=beside is not None)
+    by_logger = added_us is not None or logger is not None
+    plan = schedule(card, wanted, STEP_S, rng_pilot, by_logger=by_logger, holds=logger is not None)
     n = len(plan.orders.attention)
     hands = _hands(card, frame, trim, draws, n)
     wind = np.array([card.air.wind_north_mps, card.air.wind_east_mps, 0.0])
     launch, rest = _start(card, trim, wind)
-    rest = tilted(rest, hands.ground_steps, STEP_S) if beside is not None else rest[None]
+    rest = tilted(rest, hands.ground_steps, STEP_S) if logger is not None else rest[None]
 
     period = hands.period_steps
     frames = -(-n // period)
     starts = np.arange(frames, dtype=np.float64) * RC_PERIOD_S
     link, preset = _link(card, starts)
-    if beside is not None:
+    if logger is not None:
         added_us = np.zeros((n, 3))
     radio = Radio(link, preset, np.zeros((0, 3)) if added_us is None else added_us)
     turbulence = air_model.turbulence(card.air, card.flight.height_m)
@@ -215,7 +215,7 @@ def fly(
         pulse_starts_s=starts,
     )
     chunk = max(period * 50, n // 100 // period * period)
-    follow = None if beside is None else beside(flown, radio.added_us)
+    follow = None if logger is None else logger(flown, radio.added_us)
     done = first = 0
     while first < n:
         last = min(first + chunk if follow is None else follow(first), n)

@@ -18,7 +18,7 @@ NAMES = {"ulog": ".ulg", "dataflash": ".ardupilot.bin", "tlog": ".tlog"}
 def write_autopilot_log(
     kind: str, record: FlightRecord, data: AirData, stem: Path, *, airframe: str
 ) -> Path:
-    """Write a log beside the flight's other files; return its path.
+    """Write a log next to the flight's other files; return its path.
 
     Parameters
     ----------

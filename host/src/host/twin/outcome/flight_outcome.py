@@ -117,7 +117,7 @@ def simulate(
     pictures : bool
         Draw flight.png.
     both : bool
-        Fly the thesis's logger beside it, into the same picture.
+        Fly the thesis's logger too, into the same picture.
     progress : callable
         Called with the stage and its share.
     logs : sequence of str

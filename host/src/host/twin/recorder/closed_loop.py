@@ -1,4 +1,4 @@
-"""The recorder beside an aircraft in flight: what it adds to the servos is flown at once.
+"""The recorder in one loop with an aircraft: what it adds to the servos is flown at once.
 
 For a flight card that holds axes. The aircraft is flown up to the next frame of the receiver or the
 next sample of the IMU; then the recorder runs up to where the one behind it can reach it. Pitots,
@@ -29,7 +29,7 @@ KEPT_FRAMES = 10  # of the receiver: a servo's pulse follows a stick's by one or
 
 
 class ClosedLoop:
-    """One flight of the recorder; `beside` is what `fly` wants.
+    """One flight of the recorder; `power_on` is the logger that `fly` takes.
 
     Attributes
     ----------
@@ -45,8 +45,8 @@ class ClosedLoop:
         self.packets: list[ImuPacket] = []
         self._frames = self._samples = 0
 
-    def beside(self, record: FlightRecord, added_us: Array) -> Callable[[int], int]:
-        """Power on beside this flight; see `fly.Beside`."""
+    def power_on(self, record: FlightRecord, added_us: Array) -> Callable[[int], int]:
+        """Power on in this flight; see `fly.LoopedLogger`."""
         nothing = replace(self._given, edges=self._given.edges[:0], packets=[])
         give_stimuli(self._sitl, nothing, self._given.duration)
         self._sitl.power_on()

@@ -3,7 +3,7 @@
 The aircraft flies with the inputs that the logger added, then the recorder runs through that
 flight, until neither changes. The inputs follow from clock and card, so two rounds are enough, or
 three where a limit ended an input. A card that holds axes feeds back: there the recorder runs
-beside the aircraft (`closed_loop`), and only what its limits watch is a round older.
+along with the aircraft (`closed_loop`), and only what its limits watch is a round older.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ def logger_flight(
                 given, rate_hz=recorder_rate_hz(card.flight.rate_hz), aircraft=plane.name,
                 flight_card=flight_card, seed=seed,
             )  # fmt: skip
-            flown = fly(legs, seed=seed, aircraft=plane, beside=loop.beside)
+            flown = fly(legs, seed=seed, aircraft=plane, logger=loop.power_on)
             given, recording = stimuli(flown, air_data(flown)), loop.recording()
         else:
             flown = fly(legs, seed=seed, aircraft=plane, added_us=added)

@@ -171,7 +171,7 @@ def _build(compiler: tuple[str, ...], root: Path, target: Path, progress: Progre
                         other.cancel()
                     return complaint
                 progress("build", done / (len(units) + 1))
-        # MinGW's C++ library goes in, for it is not beside python.exe; ziglang's does by itself.
+        # MinGW's C++ library goes in, for it is not next to python.exe; ziglang's does by itself.
         static = sys.platform == "win32" and "ziglang" not in compiler
         link = ("-shared", "-static") if static else ("-shared",)
         part = target.with_suffix(f".{os.getpid()}{_SUFFIX}")

@@ -144,7 +144,7 @@ def ready(
 
 
 def check_duration(given: Stimuli) -> None:
-    """Raise UsageError if the flight is over before the recorder is told to start."""
+    """Raise UsageError if the flight is over before the recorder gets its start."""
     duration_s = given.duration / TICKS_PER_S
     if duration_s < LET_GO_S:
         raise UsageError(

@@ -1,4 +1,4 @@
-"""MPU-6000 on the ArduIMU, and the attitude filter that runs beside it."""
+"""MPU-6000 on the ArduIMU, and the attitude filter that runs on it."""
 
 from __future__ import annotations
 
