@@ -185,7 +185,7 @@ SWITCHES = (
     _one(
         "beside the IMU",
         "widens the zero of the alpha vane without GPS",
-        "reconstruction.reconstruction:_beside_imu",
+        "reconstruction.reconstruction:_with_imu_errors",
         _vane_zero,
     ),
     _one(
@@ -246,7 +246,7 @@ SWITCHES = (
     _one(
         "reduced templates",
         "fits reduced templates with the motion beside them",
-        "linear.left_out_motion:fit_beside_left_out",
+        "linear.left_out_motion:fit_with_left_out",
         gives(None),
     ),
     _one(

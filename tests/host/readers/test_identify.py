@@ -57,7 +57,7 @@ def test_longitudinal_without_vanes_is_fitted_and_not_trusted(
     assert main(["identify", str(path), "--model", "longitudinal", "--full"]) == 0
     out = capsys.readouterr().out
     assert "pitch not" in out
-    assert "it is told by az_mps2 and rates" in out
+    assert "it comes from az_mps2 and rates" in out
 
 
 def test_surfaces_are_scaled_by_the_aircraft_file_only(tmp_path: Path) -> None:

@@ -119,7 +119,7 @@ def test_a_sign_counts_however_narrow_the_interval(right: Answer, name: str, bes
     answer = replace(right, result=replace(right.result, estimate=estimate))
     assert {name, beside} <= relied_on(right)
     assert not {name, beside} & relied_on(answer)
-    assert reason(answer, beside).startswith(f"{name} beside it: its sign is impossible")
+    assert reason(answer, beside).startswith(f"{name} linked to it: its sign is impossible")
     own = replace(answer, own_model=True)  # of which only the bounds speak
     assert name in relied_on(own)
 

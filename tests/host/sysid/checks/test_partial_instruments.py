@@ -338,6 +338,6 @@ def test_a_side_force_of_doubtful_unit_is_in_no_linear_fit(trainer: pd.DataFrame
 
 def test_an_angle_that_nothing_tells_is_refused_with_the_reason(trainer: pd.DataFrame) -> None:
     table = trainer[list(LONGITUDINAL)].drop(columns="az_mps2")
-    with pytest.raises(IdentificationError, match="az_mps2 beside the airspeed, or a vane") as why:
+    with pytest.raises(IdentificationError, match="az_mps2 with the airspeed, or a vane") as why:
         host.identify(table, models="longitudinal")
     assert "data compatibility" not in str(why.value)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from host.sysid.aerodynamics import ShiftedEstimate
 from host.sysid.errors import add_systematic_covariance
-from host.sysid.errors.widest_errors import BESIDE, NOISE, widest_errors
+from host.sysid.errors.widest_errors import NOISE, OUTSIDE_MODEL, widest_errors
 from host.sysid.models import FitResult, free_model
 
 
@@ -37,7 +37,7 @@ def test_the_largest_part_is_named() -> None:
     )
     total = add_systematic_covariance(statistical, shifts)
     assert widest_errors(fit, statistical, total, shifts) == {
-        "a": NOISE, "b": BESIDE, "c": "scale of the pitot", "d": "delay of the servos",
+        "a": NOISE, "b": OUTSIDE_MODEL, "c": "scale of the pitot", "d": "delay of the servos",
         "e": "delay of the servos",
     }  # fmt: skip
     many = tuple(ShiftedEstimate(f"e{k}", statistical.estimate + 0.5, 1.0, 1.0) for k in range(20))

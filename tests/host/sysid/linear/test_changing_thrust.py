@@ -7,7 +7,7 @@ import pytest
 from host.aircraft.mass_properties import AirframeData
 from host.constants import GRAVITY_MPS2
 from host.sysid.aerodynamics import with_thrust
-from host.sysid.aerodynamics.thrust_terms import LEAST_SHARE, THRUST_BESIDE
+from host.sysid.aerodynamics.thrust_terms import LEAST_SHARE, THRUST_AS_INPUT
 from host.sysid.linear import Answer
 from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import Trim
@@ -163,7 +163,7 @@ def test_derivatives_hold_while_measured_thrust_steps(
     for name in PRINCIPAL:
         assert abs(found.result.value(name) - true[name]) < half[name], name
         assert half[name] < (0.25 if name == "D_V" else 0.06) * abs(true[name]), name
-    assert THRUST_BESIDE in found.result.warnings
+    assert THRUST_AS_INPUT in found.result.warnings
 
 
 def test_thrust_that_only_airspeed_moves_changes_nothing() -> None:
@@ -178,7 +178,7 @@ def test_thrust_that_only_airspeed_moves_changes_nothing() -> None:
     ]
     assert np.ptp(falling) > LEAST_SHARE * np.mean(thrust)
     for one in found:
-        assert THRUST_BESIDE not in one.result.warnings
+        assert THRUST_AS_INPUT not in one.result.warnings
         assert np.array_equal(one.result.estimate, found[0].result.estimate)
         assert np.array_equal(one.result.covariance, found[0].result.covariance)
 

@@ -59,11 +59,11 @@ def test_an_error_that_is_known_elsewhere_accuses_no_model(lag_s: float, seen: b
     allowed = np.zeros((4, maneuver.samples, 1))
     allowed[2, :, 0] = 0.03 * found.responses[0].y[2]
     alone = input_coherence(problem, found.responses, found.theta)
-    beside = input_coherence(problem, found.responses, found.theta, beside=[allowed])
+    known = input_coherence(problem, found.responses, found.theta, nuisance=[allowed])
     assert alone.coherent
-    assert bool(beside.coherent) == seen
-    assert beside.information.shape == alone.information.shape
-    assert beside.shift.shape == alone.shift.shape
+    assert bool(known.coherent) == seen
+    assert known.information.shape == alone.information.shape
+    assert known.shift.shape == alone.shift.shape
 
 
 def test_the_noise_beside_the_inputs_is_that_of_a_right_model() -> None:

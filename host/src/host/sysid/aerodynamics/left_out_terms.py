@@ -2,8 +2,8 @@
 
 Wings do not stay level in a dutch roll, nor the nose ahead in a roll. A term that acts so is no
 part of the reduced model, but its column is measured: it is a further input, its derivative
-estimated beside those of the model. On a record of 1.5 s no test of the residual sees what is
-missing (N_beta 16 % large, known to 1.5): the prior says how large it may be.
+estimated with those of the model. On a record of 1.5 s no test of the residual sees what is
+missing (N_beta is 16 % large, known to 1.5): the prior says how large it may be.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Thrust that was measured and changed: a force beside the linear model, no state's doing.
+"""Thrust that was measured and changed: a force added to the linear model, caused by no state.
 
 Without it a step of thrust passes for what airspeed and gusts do: of an airliner in calm air whose
 thrust stepped by a quarter M_alpha was -1.5 +- 7.5, truth -5.8. How much it pulls is known over the
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 THRUST_ROWS = {"airspeed_mps": "D_thrust", "alpha_rad": "Z_thrust", "q_radps": "M_thrust"}
 # Of thrust, rms: what changes less moves a model by less than its noise does.
 LEAST_SHARE = 0.03
-THRUST_BESIDE = "thrust changed, and stands beside the model as measured: D_V is at constant thrust"
+THRUST_AS_INPUT = "measured thrust changed and is an input of its own: D_V is at constant thrust"
 NORMAL_SHARE = 0.2  # of thrust that acts normal to the path, one deviation
 TRIMMED_RAD = 0.2  # of elevator that holds the moment of thrust, one deviation
 
@@ -41,7 +41,7 @@ def thrust_terms(
     trim: Trim,
     airframe: AirframeData | None,
 ) -> tuple[LeftOutTerm, ...]:
-    """Return what thrust does beside a model; nothing where it is not known, or follows airspeed.
+    """Return the terms of thrust for a model; none where it is not known, or follows airspeed.
 
     Thrust of a propeller that is left alone falls with airspeed: that is in D_V as ever.
 
@@ -58,7 +58,7 @@ def thrust_terms(
     if not rows or not all(THRUST in c and "airspeed_mps" in c for c in cuts) or not trim.known:
         return ()
     usual_n = float(np.sqrt(np.mean(np.concatenate([c[THRUST] for c in cuts]) ** 2)))
-    if _beside_airspeed_n(cuts) <= LEAST_SHARE * usual_n:
+    if _without_airspeed_n(cuts) <= LEAST_SHARE * usual_n:
         return ()
     known = airframe is not None
     pull = usual_n / airframe.mass_kg if airframe is not None else GRAVITY_MPS2
@@ -75,7 +75,7 @@ def thrust_terms(
     )
 
 
-def beside_thrust(
+def with_thrust_input(
     model: LinearModel,
     maneuvers: Sequence[Maneuver],
     cuts: Sequence[Mapping[str, Array]],
@@ -106,7 +106,7 @@ def beside_thrust(
     return wide, driven
 
 
-def _beside_airspeed_n(cuts: Sequence[Mapping[str, Array]]) -> float:
+def _without_airspeed_n(cuts: Sequence[Mapping[str, Array]]) -> float:
     """Return the rms of thrust about its mean in each maneuver that no airspeed explains."""
     thrust, speed = (
         np.concatenate([c[name] - np.mean(c[name]) for c in cuts])

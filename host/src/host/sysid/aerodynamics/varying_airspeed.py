@@ -110,7 +110,7 @@ class VaryingModel:
         return tuple(found)
 
     @property
-    def beside(self) -> tuple[LeftOutTerm, ...]:
+    def added_terms(self) -> tuple[LeftOutTerm, ...]:
         """Terms of measured columns that the template has not."""
         return (*self.left_out, *self.thrust)
 
@@ -133,8 +133,8 @@ class VaryingModel:
                 place = m + scaled.index(key)
                 terms.append(Term(matrix, term.row, place, term.parameter, term.gain))
         rests = m + len(scaled) + n + len(self.forces)
-        beside = rests + len(by_lift) + (len(airspeed) > 0)
-        size = beside + len(self.beside)
+        first = rests + len(by_lift) + (len(airspeed) > 0)
+        size = first + len(self.added_terms)
         B, D = np.zeros((n, size)), np.zeros((p, size))
         B[:, :m], D[:, :m] = base.B, base.D
         B[:, m + len(scaled) : m + len(scaled) + n] = np.eye(n)
@@ -143,9 +143,9 @@ class VaryingModel:
         for k, (name, row, _, _) in enumerate(by_lift):
             terms += acting_terms(base, self.trim, name, row, rests + k)
         for name, row in airspeed:
-            terms += acting_terms(base, self.trim, name, row, beside - 1)
-        for k, extra in enumerate(self.beside):
-            terms += acting_terms(base, self.trim, extra.name, extra.row, beside + k, extra.gain)
+            terms += acting_terms(base, self.trim, name, row, first - 1)
+        for k, extra in enumerate(self.added_terms):
+            terms += acting_terms(base, self.trim, extra.name, extra.row, first + k, extra.gain)
         return replace(
             base,
             name=f"{base.name}, airspeed varying",
@@ -157,7 +157,7 @@ class VaryingModel:
                 *base.parameters,
                 *(Parameter(name) for name, _, _, _ in by_lift),
                 *(Parameter(name) for name, _ in airspeed),
-                *(Parameter(t.name) for t in self.beside),
+                *(Parameter(t.name) for t in self.added_terms),
             ),
         )
 
@@ -173,7 +173,7 @@ class VaryingModel:
                 for _, row, column, by_alpha in LIFT_TERMS[self.axis]
             ),
             *(("airspeed over its trim",) if AIRSPEED_TERMS[self.axis] else ()),
-            *(t.input_name for t in self.beside),
+            *(t.input_name for t in self.added_terms),
         )
 
     def _moving(self, values: Array) -> Array:
@@ -215,7 +215,7 @@ class VaryingModel:
         ]
         if AIRSPEED_TERMS[self.axis]:
             inputs.append(self._moving(ratio - 1.0))
-        inputs += [self._moving(_deviation(columns[t.column])) for t in self.beside]
+        inputs += [self._moving(_deviation(columns[t.column])) for t in self.added_terms]
         outputs = np.column_stack([columns[y] for y in self.base.outputs])
         return Maneuver(dt_s, np.column_stack(inputs), outputs, name=name)
 

@@ -62,7 +62,7 @@ def draw_all(
     flights : sequence of mapping
         Columns of what the coefficients were made of; surfaces give the spectrum of the inputs.
     truth : dict, optional
-        Truth file of a simulated flight, drawn beside the intervals.
+        Truth file of a simulated flight, drawn with the intervals.
     findings : sequence of Finding
         Those of feedback are named under a frequency response.
 
@@ -148,7 +148,7 @@ def draw_coefficients(
     flights : sequence of mapping
         Columns of what it was made of; surfaces give the spectrum of the inputs.
     truth : dict, optional
-        Truth file of a simulated flight, drawn beside the intervals.
+        Truth file of a simulated flight, drawn with the intervals.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What an autopilot's autotune says of the same response: a third opinion beside model and record.
+"""What an autopilot's autotune says of the same response: a third opinion next to model and record.
 
 Both answer the torque setpoint. An answer's model is driven by a surface: the torque comes to it by
 the share that the log shows, and through the servo.
@@ -36,7 +36,7 @@ FOLLOWS = 0.9  # correlation of a surface with the torque that moves it alone
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Opinion:
-    """One axis: an autotune's model beside an answer's, both over the torque setpoint.
+    """One axis: an autotune's model and an answer's, both over the torque setpoint.
 
     Attributes
     ----------

@@ -110,8 +110,8 @@ class CoefficientView:
         fit, k = self.answer.fit, self.names.index(name)
         sd = np.sqrt(np.maximum(np.diag(fit.covariance), 1e-300))
         correlated = np.abs(fit.covariance[k] / sd[k] / sd) > ENTANGLED
-        beside = {other for other, one in zip(self.names, correlated, strict=False) if one}
-        return beside | set(_of_equation(self.names, name.partition("_")[0]))
+        entangled = {other for other, one in zip(self.names, correlated, strict=False) if one}
+        return entangled | set(_of_equation(self.names, name.partition("_")[0]))
 
     def first_lines(self) -> list[str]:
         """Return nothing: the search has no other end."""
@@ -127,7 +127,7 @@ class CoefficientView:
         return [*_agreement_lines(self.answer), _prediction_line(self.answer)]
 
 
-def lag_beside(view: CoefficientView, evidence: Evidence) -> list[Doubt]:
+def hidden_lag(view: CoefficientView, evidence: Evidence) -> list[Doubt]:
     """Doubt moments of surfaces that seem to lag: no interval holds what that does."""
     names = [n for n in view.names if n.partition("_")[0] in view.answer.lagging]
     return doubt(names, view.names, "surfaces seem to lag behind their columns")
@@ -190,5 +190,5 @@ RULES: tuple[Rule, ...] = (
     open_finding,
     input_feedback,
     impossible_sign,
-    lag_beside,
+    hidden_lag,
 )

@@ -1,8 +1,8 @@
 """Is the lag between command and surface known? Else no derivative of a turning rate is.
 
 A moment that comes later is less damping: where neither the data nor a file tell the lag, or the
-data tell no damping beside it, it and the derivatives of the equations in which the commands act
-cannot be told apart. On a real autopilot's records two lags 87 ms apart fitted alike, each told to
+data determine no damping with it, it and the derivatives of the equations in which the commands act
+cannot be separated. On a real autopilot's records two lags 87 ms apart fit alike, each known to
 9 ms, with M_q of -11 +- 18 and -301 +- 27000 1/s.
 """
 
@@ -27,14 +27,14 @@ def unknown_lag(answer: Answer) -> str:
     result, half = answer.result, answer.result.half_width()
     for names in (_controls(answer), _dampings(answer)):
         own = {name: result.index(name) for name in names}
-        told = [name for name, k in own.items() if abs(result.estimate[k]) > half[k]]
-        if own and not told:
+        significant = [name for name, k in own.items() if abs(result.estimate[k]) > half[k]]
+        if own and not significant:
             return f"{', '.join(own)} may be zero"
     return ""
 
 
 def lag_lookalikes(answer: Answer) -> tuple[str, ...]:
-    """Return the parameters that cannot be told apart from the lag, in the model's order."""
+    """Return the parameters that cannot be separated from the lag, in the model's order."""
     if answer.servo is None:
         return ()
     alike = set(answer.servo.alike)

@@ -1,4 +1,4 @@
-"""Inputs that were moved as one, by a mixer or a habit: their derivatives cannot be told apart."""
+"""Inputs that were moved as one, by a mixer or a habit: their derivatives cannot be separated."""
 
 from __future__ import annotations
 

@@ -299,7 +299,7 @@ def spectra(inputs: Sequence[Excitation], modes: Sequence[tuple[str, float]], ti
 
 
 def _name_poles(axis: Axes, poles: Sequence[tuple[str, complex]]) -> None:
-    """Write names beside poles, one below the other where poles are close."""
+    """Write names next to poles, one below the other where poles are close."""
     (left, right), (low, high) = axis.get_xlim(), axis.get_ylim()
     placed: list[tuple[float, float]] = []
     for name, pole in sorted(poles, key=lambda p: -abs(p[1].imag)):

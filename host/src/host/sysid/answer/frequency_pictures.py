@@ -57,7 +57,7 @@ def frequency_pictures(
     findings : sequence of Finding
         Those of feedback say which responses lean towards the controller's inverse.
     opinions : sequence of sequence of Opinion
-        What autotunes say beside each answer, drawn over it.
+        What autotunes say of each answer, drawn over it.
 
     Raises
     ------
@@ -67,18 +67,18 @@ def frequency_pictures(
     pairs: list[Pair] = []
     titles, lines = [], []
     for number, answer in enumerate(answers):
-        beside = opinions[number] if opinions else ()
+        own_opinions = opinions[number] if opinions else ()
         try:
             own, method = pairs_of(answer)
         except IdentificationError as error:
             lines.append(f"{answer.template}: no frequency response: {error}")
             continue
-        pairs += [replace(pair, opinions=opinions_of(pair, beside)) for pair in own]
+        pairs += [replace(pair, opinions=opinions_of(pair, own_opinions)) for pair in own]
         titles.append(f"{answer.template}, {answer.method}: {method}")
         warned = feedback_lines(answer.model.inputs, findings)
         titles += warned
         lines += [titles[-1 - len(warned)], *(f"  {line}" for line in (*band_lines(own), *warned))]
-        lines += [f"  {one.line}" for one in beside]
+        lines += [f"  {one.line}" for one in own_opinions]
     return ([frequency_figure(pairs, "\n".join(titles))] if pairs else []), lines
 
 
@@ -212,7 +212,7 @@ def _draw(axes: Any, pair: Pair, *, first: bool) -> None:
     f, scale = pair.frequency_hz, shown(pair.output)[1] / shown(pair.input)[1]
     coherent, band = pair.coherence > COHERENT, pair.band_hz
     phase = np.unwrap(np.angle(pair.model))
-    beside = phase + np.angle(pair.recorded / pair.model)  # the turn that is nearest to the model
+    recorded = phase + np.angle(pair.recorded / pair.model)  # the turn that is nearest to the model
     for their_hz, theirs, their_half in pair.opinions:
         own = np.interp(their_hz, f, phase)
         turn = own + np.angle(theirs * np.exp(-1j * own))  # that is nearest to the model
@@ -226,7 +226,7 @@ def _draw(axes: Any, pair: Pair, *, first: bool) -> None:
     for axis, dots, line, half in (
         (axes[0], DECIBEL * np.log(np.maximum(np.abs(scale * pair.recorded), 1e-300)),
          DECIBEL * np.log(np.abs(scale * pair.model)), DECIBEL * pair.half_width.real),
-        (axes[1], np.degrees(beside), np.degrees(phase), np.degrees(pair.half_width.imag)),
+        (axes[1], np.degrees(recorded), np.degrees(phase), np.degrees(pair.half_width.imag)),
     ):  # fmt: skip
         axis.plot(f[~coherent], dots[~coherent], ".", color=FAINT, ms=2)
         axis.plot(f[coherent], dots[coherent], ".", color=RECORD, ms=3)

@@ -52,7 +52,7 @@ def motion_left_out(answer: Answer, evidence: Evidence) -> list[Doubt]:
 
 
 def divided_by(answer: Answer, channel: str) -> set[str]:
-    """Return the parameters that a column scales beside its own equation.
+    """Return the parameters that a column scales besides its own equation.
 
     Airspeed is in the numbers of a model, where it is no state: the templates have forces over it.
     With an aircraft file dynamic pressure turns every derivative into a coefficient.

@@ -25,7 +25,7 @@ class Judged:
     share : float
         95 % half-width over what it is judged against.
     against : tuple of str
-        What speaks against it beside its width, a plain line each.
+        What speaks against it besides its width, a plain line each.
     small : bool
         Less than 5 % of its row, and known to be so.
     """

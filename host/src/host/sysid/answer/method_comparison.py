@@ -1,4 +1,4 @@
-"""What several methods say of one model, beside each other, as wide as the terminal."""
+"""What several methods say of one model, side by side, as wide as the terminal."""
 
 from __future__ import annotations
 

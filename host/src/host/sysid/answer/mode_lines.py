@@ -94,7 +94,7 @@ def _judged(mode: Mode, reasons: Sequence[str]) -> JudgedMode:
 
 
 def _doubts(name: str, reasons: Mapping[str, Sequence[str]]) -> list[str]:
-    """Return what is said against the coefficients of a mode beside their width."""
+    """Return what is said against the coefficients of a mode besides their width."""
     return [why for part in MADE_OF.get(name, ()) for why in reasons.get(part, ())[1:]]
 
 

@@ -1,4 +1,4 @@
-"""Where a parameter of a linear model stands: in which equation, beside which signal."""
+"""Where a parameter of a linear model stands: in which equation, times which signal."""
 
 from __future__ import annotations
 

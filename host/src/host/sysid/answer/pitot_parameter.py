@@ -18,7 +18,7 @@ SCALE = "PX4's ASPD_SCALE_n"  # on airspeed
 def pitot_lines(
     flights: Sequence[ReconstructedFlight], agreements: Sequence[Compatibility | None]
 ) -> list[str]:
-    """Return a line for each autopilot's flight whose pitot is told to be off.
+    """Return a line for each autopilot's flight whose pitot errs beyond its interval.
 
     With k = true over indicated airspeed the new ratio is the old one times k squared, and the new
     scale the old one times k.
@@ -33,10 +33,10 @@ def pitot_lines(
     for flight, found in zip(flights, agreements, strict=True):
         if flight.maker != AUTOPILOT or found is None:
             continue
-        told = pressure_scale(found)
-        if told is None or abs(told[0]) <= told[1]:
+        high = pressure_scale(found)
+        if high is None or abs(high[0]) <= high[1]:
             continue
-        share, half = told
+        share, half = high
         squared, squared_half = 1.0 / (1.0 + share), half / (1.0 + share) ** 2
         k, k_half = sqrt(squared), 0.5 * squared_half / sqrt(squared)
         ratio = f"{RATIO} its value times {squared:.3f} +- {squared_half:.2g}"

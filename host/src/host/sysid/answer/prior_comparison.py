@@ -1,4 +1,4 @@
-"""What a handbook, a vortex lattice or the fleet of its type said, beside what the flight says.
+"""What a handbook, a vortex lattice or the fleet of its type said, compared with the flight.
 
 A prior with half-widths, as `host fleet` writes it for a further aircraft of a type, is weighed
 with the flight: both are estimates of the same number, each counts by its inverse variance.
@@ -40,7 +40,7 @@ def prior_lines(tables: Sequence[CoefficientTable], prior: PriorTable) -> list[s
 
 
 def _table_lines(table: CoefficientTable, prior: PriorTable) -> list[str]:
-    """Return one table beside its prior; nothing where they share no coefficient."""
+    """Return one table with its prior; nothing where they share no coefficient."""
     expected = prior.at(table.alpha_rad)
     shared = [c for c in table.coefficients if c.name in expected]
     if not shared:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from host.aircraft.gains import COEFFICIENT_ROWS, coefficient_name
 from host.sysid.answer.converted_marks import converted_marks
 from host.sysid.answer.parameter_words import in_words, word_of
-from host.sysid.errors.widest_errors import BESIDE, NOISE
+from host.sysid.errors.widest_errors import NOISE, OUTSIDE_MODEL
 from host.sysid.models.parameter_units import parameter_unit
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
     from host.sysid.linear.linear_answer import Answer
 
-FLOWN_AWAY = ("", NOISE, BESIDE)  # causes that more or larger inputs make smaller
+FLOWN_AWAY = ("", NOISE, OUTSIDE_MODEL)  # causes that more or larger inputs make smaller
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ class SummaryRow:
     cause : str
         What widens the interval most.
     against : tuple of str
-        What speaks against it beside its width.
+        What speaks against it besides its width.
     """
 
     name: str

@@ -60,7 +60,9 @@ def impossible_sign(view: EstimateView, evidence: Evidence) -> list[Doubt]:
         for name, reason in impossible_signs(view.values).items()
         for one in (
             *doubt([name], view.names, reason),
-            *doubt(set(view.entangled(name)) - {name}, view.names, f"{name} beside it: {reason}"),
+            *doubt(
+                set(view.entangled(name)) - {name}, view.names, f"{name} linked to it: {reason}"
+            ),
         )
     ]
 

@@ -1,4 +1,4 @@
-"""The answer beside the truth of a simulated flight."""
+"""The answer compared with the truth of a simulated flight."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def read_truth(path: Path) -> dict[str, Any]:
-    """Read the truth file `host simulate` writes beside a log.
+    """Read the truth file `host simulate` writes next to a log.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def true_poles(
 
 @dataclass(frozen=True, slots=True)
 class TruthComparison:
-    """One figure beside the truth; the error is relative to `reference`.
+    """One figure and its truth; the error is relative to `reference`.
 
     That is |truth|, or what would contribute 5 % of its row's largest where that is known and more
     (`small`): a coefficient that is next to nothing is not judged by its own size.
@@ -185,7 +185,7 @@ def true_references(answer: Answer, document: dict[str, Any]) -> dict[str, float
 
 
 def compared_estimates(answer: Answer, document: dict[str, Any]) -> list[TruthComparison]:
-    """Return the coefficients of a linear answer beside the truth; without any its derivatives."""
+    """Return the coefficients of a linear answer with their truth; without any its derivatives."""
     flown = as_flown(document, answer)
     if answer.coefficients:
         return compared_coefficients(answer.table, flown, coefficient_floors(answer, flown))
@@ -249,7 +249,7 @@ def truth_report_lines(
 ) -> list[str]:
     """Return all answers against the truth: coefficients fitted directly line by line.
 
-    Without such a fit the linear models are; beside one they have a summary each.
+    Without such a fit the linear models are; with one they have a summary each.
     """
     lines = []
     if direct:

@@ -68,7 +68,7 @@ class DrivenTest:
 
     def __init__(self, law: Identity) -> None:
         columns = [_lagged(u, lag)[PAST_STEPS:] for u in law.inputs for lag in LAGS_STEPS]
-        own = np.column_stack([np.ones(len(law.rate)), *law.beside])[PAST_STEPS:]
+        own = np.column_stack([np.ones(len(law.rate)), *law.auxiliary])[PAST_STEPS:]
         self._own = _basis(own)
         self._basis = _basis(_off(np.column_stack(columns), self._own))
         self.instruments = self._basis.shape[1]
@@ -89,7 +89,7 @@ class DrivenTest:
     def misfits(self, scaled: str, factors: Sequence[float] | Array) -> Array:
         """Return the same where a part, or a term of one, counts so many times, one a factor.
 
-        It has no scale beside it then.
+        It has no scale as well then.
         """
         return _squared(*self._explained(scaled, factors))
 
@@ -214,7 +214,7 @@ def _by_factor(
 
 def testable(law: Identity) -> bool:
     """Return whether a record is long enough, and a surface moved, to test an identity."""
-    count = PAST_STEPS + 1 + len(law.beside) + len(law.inputs) * len(LAGS_STEPS)
+    count = PAST_STEPS + 1 + len(law.auxiliary) + len(law.inputs) * len(LAGS_STEPS)
     long = law.step_s * len(law.rate) >= SHORTEST_S
     return long and len(law.inputs) > 0 and len(law.rate) - PAST_STEPS >= ROWS_EACH * count
 

@@ -86,7 +86,7 @@ def blamed(
 def _settled(asked: Sequence[Finding], reading: Reading, left: Sequence[Finding]) -> list[Finding]:
     """Return the findings that a reading settles, with what was done."""
     remain = {(f.check, f.channels) for f in left}
-    # A doubt about a column that is read as it is: the wrong unit beside it made it.
+    # A doubt about a column that is read as it is: the wrong unit of another made it.
     return [
         replace(f, done=reading.line, wrong_unit=f.wrong_unit or not reading.weight)
         for f in asked

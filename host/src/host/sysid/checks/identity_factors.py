@@ -33,7 +33,7 @@ class Identity:
         What each other column makes of it, (steps,) each.
     terms : dict
         What single columns make of a part, (steps,) each.
-    beside : tuple of arrays
+    auxiliary : tuple of arrays
         What may have any factor, (steps,) each.
     opposed : float
         Correlation of its steps with those of the force that it makes: near -1 of a wind angle.
@@ -55,7 +55,7 @@ class Identity:
     rate: Array
     parts: dict[str, Array]
     terms: dict[str, Array] = field(default_factory=dict)
-    beside: tuple[Array, ...] = ()
+    auxiliary: tuple[Array, ...] = ()
     opposed: float = 0.0
     inputs: tuple[Array, ...] = ()
     driven: bool = False
@@ -105,7 +105,7 @@ class Factor:
 
 def factors(law: Identity, least: float = FACTOR_CORRELATION) -> Iterator[Factor]:
     """Return the factor of each part that is correlated with an identity, the others apart."""
-    own = np.column_stack([np.ones(len(law.rate)), *law.beside])
+    own = np.column_stack([np.ones(len(law.rate)), *law.auxiliary])
     for name, part in law.parts.items():
         others = [v for k, v in law.parts.items() if k != name]
         x, y = (without(v, np.column_stack([own, *others])) for v in (part, law.rate))

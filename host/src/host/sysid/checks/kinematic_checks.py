@@ -81,7 +81,7 @@ def consistent(flown: Mapping[str, Array], dt_s: float, *, weighed: bool = True)
                 continue
             # Gusts turn this wind angle, where no surface does: no rate says so.
         else:
-            findings += [one for f in _told(law) if (one := _judge(f)) is not None]
+            findings += [one for f in _without_gusts(law) if (one := _judge(f)) is not None]
         findings += map(_judge_driven, driven_factors(law) if weighed else ())
     if weighed and not any(f.wrong_unit for f in findings):
         findings += _judge_airspeed(laws) or _judge_units(laws, means_over(flown, dt_s, BLOCK_S))
@@ -105,7 +105,7 @@ def related(
     return {(law.name, f.name): f.explained**0.5 for law in laws for f in factors(law, least)}
 
 
-def _told(law: Identity) -> Iterator[Factor]:
+def _without_gusts(law: Identity) -> Iterator[Factor]:
     """Return the factors that no gusts made.
 
     An aircraft turns into the gusts that turn its wind angles, slower than they do: a rate that
@@ -118,7 +118,7 @@ def _told(law: Identity) -> Iterator[Factor]:
 
 def _unrelated(law: Identity) -> Finding | None:
     """Return the finding of a column that does not follow its kinematic identity."""
-    own = np.column_stack([np.ones(len(law.rate)), *law.beside])
+    own = np.column_stack([np.ones(len(law.rate)), *law.auxiliary])
     rate = without(law.rate, own)
     left = without(law.rate, np.column_stack([own, *law.parts.values()]))
     noise = _difference_noise(left)

@@ -59,16 +59,16 @@ def _fast(m: Mapping[str, Array]) -> Iterator[Identity]:
     alpha, beta = m.get("alpha_rad", zero), m.get("beta_rad", zero)
     steep = np.clip(theta, -STEEPEST_RAD, STEEPEST_RAD)
     p, q, r = (m.get(f"{k}_radps", zero) for k in "pqr")
-    # What is small in level flight goes beside: too little to be judged itself.
+    # What is small in level flight is auxiliary: too little to be judged itself.
     roll_yaw = np.sin(phi) * q + np.cos(phi) * r
     laws: tuple[tuple[str, str, Array, Array], ...] = (
         ("theta_rad", "q_radps", np.cos(phi) * q, np.sin(phi) * r),
         ("psi_rad", "r_radps", np.cos(phi) * r / np.cos(steep), np.sin(phi) * q / np.cos(steep)),
         ("phi_rad", "p_radps", p, np.tan(steep) * roll_yaw),
     )
-    for name, rate, part, beside in laws:
+    for name, rate, part, auxiliary in laws:
         if name in m and rate in m:
-            yield _law(name, m, {rate: part}, (beside,), explained_share=ANGLE_EXPLAINED)
+            yield _law(name, m, {rate: part}, (auxiliary,), explained_share=ANGLE_EXPLAINED)
     yield from _wind_angles(m, phi, theta, alpha, beta, (p, q, r))
 
 
@@ -175,12 +175,12 @@ def _slow(m: Mapping[str, Array]) -> Iterator[Identity]:
 
 
 def _shear(law: Identity) -> float:
-    """Return the likeliest change of head wind with height, 1/s, beside any factor of the force.
+    """Return the likeliest change of head wind with height, 1/s, with any factor of the force.
 
-    It is the rest beside the only part of the identity, within what shear usually is: a force
+    It is the rest after the only part of the identity, within what shear usually is: a force
     that is turned round stays one.
     """
-    (part,), (climb,) = law.parts.values(), law.beside
+    (part,), (climb,) = law.parts.values(), law.auxiliary
     columns = np.column_stack([np.ones(len(climb)), part, climb])
     noise = max(float(np.mean(without(law.rate, columns) ** 2)), 1e-12)
     x, y = (without(v, columns[:, :2]) for v in (climb, law.rate))
@@ -199,7 +199,7 @@ def _law(
     name: str,
     m: Mapping[str, Array],
     parts: Mapping[str, Array],
-    beside: tuple[Array, ...] = (),
+    auxiliary: tuple[Array, ...] = (),
     *,
     known: Array | None = None,
     terms: Mapping[str, Array] = MappingProxyType({}),
@@ -224,7 +224,7 @@ def _law(
         (np.diff(m[name]) / step_s)[1:-1][even] - (0.0 if known is None else over(known)),
         {k: over(v) for k, v in parts.items()},
         terms={k: over(v) for k, v in terms.items()},
-        beside=tuple(over(b) for b in beside),
+        auxiliary=tuple(over(b) for b in auxiliary),
         opposed=0.0 if force is None else correlation(np.diff(over(m[name])), np.diff(over(force))),
         inputs=tuple(over(m[u]) for u in inputs if u in m and np.ptp(m[u]) > 0.0),
         driven=any(u in m and np.ptp(m[u]) > DRIVING_RAD for u in inputs),

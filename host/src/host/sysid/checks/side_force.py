@@ -1,4 +1,4 @@
-"""How large side forces are beside lift: in which unit a side force is likely.
+"""How large side forces are compared with lift: in which unit a side force is likely.
 
 Over the airspeed a side force turns sideslip by little, and delays of right sensors hide whether it
 is in g. CY_beta over CL_alpha is 0.02 of the Zagi and 0.28 of the Aerosonde (Beard & McLain, Small

@@ -52,7 +52,7 @@ class Reading:
         others = " or ".join(self.as_likely)
         if len(self.as_likely) < MOST_NAMED:
             return f"{first}, or as likely {others}"
-        return f"its unit cannot be told, {first}, as likely {others}"
+        return f"its unit is not known, {first}, as likely {others}"
 
     def read(self, columns: Mapping[str, Array]) -> dict[str, Array]:
         """Return all columns, these read in this way."""

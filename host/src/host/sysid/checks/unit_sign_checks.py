@@ -28,7 +28,7 @@ WITHOUT_GRAVITY = 0.5  # of the size: with less along z, weight is not in it
 DENSITY = (0.4, 1.6)
 STATIC_PA = (2e4, 1.2e5)
 PRESSURE_RATIO = (0.5, 2.0)
-# Left side, regressors beside the surface, expected sign: elevator positive trailing edge down.
+# Left side, auxiliary regressors, expected sign: elevator positive trailing edge down.
 SURFACES = {
     "elevator_rad": ("q_radps", ("alpha_rad", "q_radps"), -1.0, "pitch the nose up"),
     "aileron_rad": ("p_radps", ("beta_rad", "p_radps", "r_radps", "rudder_rad"), 1.0, "roll left"),
@@ -186,11 +186,11 @@ def _forces(means: Mapping[str, Array]) -> list[Finding]:
 def _surfaces(means: Mapping[str, Array]) -> list[Finding]:
     """Regress angular accelerations on surfaces; no proof, for a canard may mean it."""
     findings = []
-    for surface, (rate, beside, expected, wrong) in SURFACES.items():
-        needed = (surface, rate, beside[0])  # without the wind angle its moment is the surface's
+    for surface, (rate, auxiliary, expected, wrong) in SURFACES.items():
+        needed = (surface, rate, auxiliary[0])  # without the wind angle its moment is the surface's
         if any(name not in means for name in needed) or np.ptp(means[surface]) < MOVED_RAD:
             continue
-        others = [means[k] for k in beside if k in means]
+        others = [means[k] for k in auxiliary if k in means]
         left = np.gradient(means[rate], means["t_s"])
         X = np.column_stack([means[surface], *others, np.ones(len(left))])
         size = np.maximum(np.abs(X).max(axis=0), 1e-12)
@@ -231,9 +231,9 @@ def _ahead(means: Mapping[str, Array], rate: str, own: str, pair: tuple[str, str
     other = pair[1] if own == pair[0] else pair[0]
     if any(np.ptp(means[s]) < MOVED_RAD for s in pair):
         return 0.0
-    beside = [means[s] for s in ("alpha_rad", "beta_rad", *RATES) if s in means]
+    auxiliary = [means[s] for s in ("alpha_rad", "beta_rad", *RATES) if s in means]
     left = np.gradient(means[rate], means["t_s"])
-    X = np.column_stack([means[own], means[other], *beside, np.ones(len(left))])
+    X = np.column_stack([means[own], means[other], *auxiliary, np.ones(len(left))])
     size = np.maximum(np.abs(X).max(axis=0), 1e-12)
     beta, *_ = np.linalg.lstsq(X / size, left, rcond=None)
     beta = beta / size

@@ -1,4 +1,4 @@
-"""The aerodynamic model straight from flight, errors of the instrument beside it.
+"""The aerodynamic model straight from flight, with errors of the instrument.
 
 The face of the room: outside of `host.sysid` these names are imported from here.
 """

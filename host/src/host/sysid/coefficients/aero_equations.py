@@ -18,7 +18,7 @@ from host.constants import GRAVITY_MPS2
 from host.sysid.models.coefficient_model import CoefficientModel
 from host.sysid.reconstruction.inverse_sensor_model import Record
 
-# Roll in elevator maneuvers: lift beside a CG off the plane of symmetry, its only clear trace.
+# Roll in elevator maneuvers: lift of a CG off the plane of symmetry, its only clear trace.
 LONGITUDINAL = ("Cm", "Cl", "w", "u")  # behind the model's two forces
 LATERAL = ("CY", "Cl", "Cn", "v")
 KINEMATIC = ("u", "v", "w")
@@ -197,8 +197,8 @@ def _moments(
     pitch -= arm_z * tx - arm_x * tz
     yaw = izz * s["rd"] - ixz * (s["pd"] - q * r) + (iyy - ixx) * p * q - q * hx
     yaw += history.drive_nm * axis[2]
-    # About the plane of symmetry, where neither lift nor drag rolls or yaws: a CG 8 mm beside it
-    # makes Cl_alpha -0.024, which left out biased Cl_r by 4 %.
+    # About the plane of symmetry, where neither lift nor drag rolls or yaws: a CG 8 mm off it
+    # makes Cl_alpha -0.024, which left out biases Cl_r by 4 %.
     roll += e["cg_y_m"] * mass * s["az"]
     yaw -= e["cg_y_m"] * mass * s["ax"]
     return roll, pitch, yaw

@@ -110,7 +110,7 @@ def simulate_noise_free(
         value, a, condition, thrust, angles | {"de": de, "da": da, "dr": dr}
     )
     pd, qd, rd = (record.rate(x) for x in (p, q, r))
-    # Accelerometers beside the CG feel the angular acceleration times their arm.
+    # Accelerometers away from the CG measure the angular acceleration times their arm.
     x, y, z = sensors.imu_m
     omega = 2.0 * np.pi * sensors.vane_hz_per_mps * V
     # Second-order vane; upwash and the vane's own motion added.

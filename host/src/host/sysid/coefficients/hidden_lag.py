@@ -1,8 +1,8 @@
 """Test whether surfaces that lag behind their columns move the coefficients of a moment.
 
 The spectrum of the residual is what weighs it: an unknown lag makes it large where the lag
-acts, and passes for noise. With 50 ms of it Cm_alpha, Cm_de and Cl_p were 42 to 55 % off, known to
-4. To first order a lag is the slope of a surface, one more column beside the terms of an equation:
+acts, and passes for noise. With 50 ms of it Cm_alpha, Cm_de and Cl_p err by 42 to 55 %, known to
+4. To first order a lag is the slope of a surface, one more column next to the terms of an equation:
 how it moves them says whether it matters, a one-sided test whether it is there: a surface ahead of
 its column is no lag (the demonstration's aileron seems 5 ms early, by 3 deviations). Instrumental
 variables keep gusts out: by least squares Cl_p of a right flight in 0.5 m/s was accused.
@@ -42,14 +42,14 @@ def lagging_moments(
         Of all.
     """
     half = {d.name: d.half_width for d in derivatives}
-    told = {d.name: d.value for d in derivatives if abs(d.value) > d.half_width}
+    significant = {d.name: d.value for d in derivatives if abs(d.value) > d.half_width}
     return tuple(
         equation
         for equation in MOMENTS
         if any(
             abs(shift) > half[name] > 0.0
             for search in searches
-            for name, shift in _shifts(search, equation, told).items()
+            for name, shift in _shifts(search, equation, significant).items()
             if name in half
         )
     )
@@ -68,14 +68,14 @@ def _shifts(search: SearchResult, equation: str, known: Mapping[str, float]) -> 
     left = np.concatenate([b.residual_after(search.final.solution.step) for b in blocks])
     alone, _ = _instrumented(terms, instruments, left)
     wide, ours = np.hstack([terms, lags]), np.hstack([instruments, lags])
-    beside, covariance = _instrumented(wide, ours, left)
+    with_lags, covariance = _instrumented(wide, ours, left)
     freedom = len(left) - wide.shape[1] - sum(b.trend_basis.shape[1] for b in blocks)
-    noise = float(np.sum((left - wide @ beside) ** 2)) / max(freedom, 1)
+    noise = float(np.sum((left - wide @ with_lags) ** 2)) / max(freedom, 1)
     deviation = np.sqrt(noise * np.diag(covariance)[count:])
     signs = np.sign([known.get(f"{equation}_{labels[k]}", 0.0) for k in moved])
-    if not _late(-signs * beside[count:], deviation, freedom):
+    if not _late(-signs * with_lags[count:], deviation, freedom):
         return {}
-    shift = beside[:count] - alone
+    shift = with_lags[:count] - alone
     return {f"{equation}_{label}": float(s) for label, s in zip(labels, shift, strict=True)}
 
 

@@ -3,7 +3,7 @@
 A force along an axis is the airspeed times the derivative of an angle's rate: airspeed that reads
 10 % high makes Z_alpha and Y_beta 10 % small. How fast the angles turn under that force tells the
 airspeed too: in calm air to 1 %, where a wrong one is seen in what the fit leaves. Gusts turn them
-as well. So its scale is one more parameter beside the estimate, with what is known of the sensor
+as well. So its scale is one more parameter next to the estimate, with what is known of the sensor
 as its prior; where the data leave most of it open, the prior stands.
 """
 
@@ -51,9 +51,9 @@ def airspeed_shift(
         return ()
     step = min(STEP, share)
     faster = replace(trim, airspeed_mps=trim.airspeed_mps * (1.0 + step))
-    beside = [(retrimmed(result.model, faster), _reading_high(result, maneuvers, step))]
+    extended = [(retrimmed(result.model, faster), _reading_high(result, maneuvers, step))]
     prior = share / step
-    found_step = found.joint(result.model, trim, maneuvers, beside, [prior])
+    found_step = found.joint(result.model, trim, maneuvers, extended, [prior])
     sd = float(np.sqrt(found_step.covariance[0, 0])) * found.widened_in(result)
     size = sd if sd < POSTERIOR_PRIOR_RATIO * prior else prior
     # What the fit left out stays out: no deviation of a sensor brings it back.

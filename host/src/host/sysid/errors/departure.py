@@ -1,4 +1,4 @@
-"""By how much departures from the trim move an estimate: removed from maneuvers, or fitted beside.
+"""By how much departures from the trim move an estimate: removed from maneuvers, or fitted too.
 
 `trim_departure` finds it.
 """
@@ -37,7 +37,7 @@ class Departure:
         With these inputs.
     maneuvers : tuple of Maneuver
         Those fitted, with these inputs.
-    beside : dict
+    nuisance : dict
         Terms that a template has not, of motion or thrust that was measured: what is expected, and
         one deviation.
     """
@@ -47,7 +47,7 @@ class Departure:
     varying: VaryingModel
     model: LinearModel
     maneuvers: tuple[Maneuver, ...]
-    beside: dict[str, tuple[float, float]]
+    nuisance: dict[str, tuple[float, float]]
 
     @property
     def step(self) -> Array:
@@ -78,8 +78,8 @@ class Departure:
         """Return a template with the departures as inputs, and the terms estimated along as
         parameters behind its own."""
         known = with_second_order(self.varying.model, base, {})
-        more = [t for t in self.varying.model.terms if t.parameter in self.beside]
-        added = (Parameter(name, mean, prior_sd=sd) for name, (mean, sd) in self.beside.items())
+        more = [t for t in self.varying.model.terms if t.parameter in self.nuisance]
+        added = (Parameter(name, mean, prior_sd=sd) for name, (mean, sd) in self.nuisance.items())
         return replace(
             known,
             terms=(*known.terms, *more),
@@ -89,14 +89,14 @@ class Departure:
 
     def expecting(self, result: FitResult) -> Departure:
         """Return the same with what another fit of the template says of the size of the terms."""
-        return replace(self, beside=expected_beside(result, self.varying.left_out))
+        return replace(self, nuisance=expected_nuisance(result, self.varying.left_out))
 
     def of_fit(self, wide: FitResult, length: int) -> Departure:
         """Return the departures as a fit of `wide_model` has them: nothing is left to be moved.
 
         `length` is that of the estimate without the terms.
         """
-        known = {name: wide.value(name) for name in self.beside}
+        known = {name: wide.value(name) for name in self.nuisance}
         return replace(
             self,
             shares=np.zeros((len(self.maneuvers), length)),
@@ -180,7 +180,7 @@ def without_further_inputs(
     ]
 
 
-def expected_beside(
+def expected_nuisance(
     result: FitResult, terms: Sequence[LeftOutTerm]
 ) -> dict[str, tuple[float, float]]:
     """Return what is expected of each term that the template leaves out, by its neighbours."""

@@ -32,7 +32,7 @@ Residuals = Callable[[LinearModel, Trim, Sequence[Maneuver]], "list[Array] | Non
 
 @dataclass(frozen=True)
 class Step:
-    """A step of the estimate and of further parameters beside it.
+    """A step of the estimate and of further parameters with it.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ class OneStep:
         if here is None:
             shares = np.zeros((len(changed), self.length))
             return Step(shares, np.zeros(count), np.zeros((count, count)), none)
-        beside = [self.residuals(one, trim, data) for one, data in extended]
+        changed_residuals = [self.residuals(one, trim, data) for one, data in extended]
         score = np.zeros((len(changed), len(self.inverse)))
         link = np.zeros((len(changed), len(self.inverse), count))
         prior = np.diag(np.asarray(prior_sd, dtype=np.float64) ** -2.0)
@@ -127,7 +127,7 @@ class OneStep:
             own, J = self.columns[k], self.slopes[k]
             score[k, own] = -(J.T @ (r - before))
             if count:
-                by = np.column_stack([r - r if b is None else b[k] - r for b in beside])
+                by = np.column_stack([r - r if b is None else b[k] - r for b in changed_residuals])
                 link[k, own] = J.T @ by
                 normal += by.T @ by
                 right -= by.T @ r
@@ -304,7 +304,7 @@ def _inverse_within(H: Array, held: BoolArray) -> Array:
 
 
 def _not_negative(information: Array) -> Array:
-    """Return what data tell beside other unknowns: where those explain all, rounding made it less
+    """Return what data say with other unknowns free: where those explain all, rounding made it less
     than nothing."""
     size, axes = np.linalg.eigh(information)
     if size.min(initial=0.0) >= 0.0:

@@ -2,7 +2,7 @@
 
 A record says what an input was at its samples. Between them it was held, or moved on; the estimate
 moves by the difference. How far the data go from one hold to the other they tell themselves: that
-share is one more parameter beside the estimate. Where that moves the estimate by more than a tenth
+share is one more parameter next to the estimate. Where that moves the estimate by more than a tenth
 of an interval it is part of it. On records without noise it is most of it.
 
 Surfaces that move between samples as servos do are those of `surface_motion`.

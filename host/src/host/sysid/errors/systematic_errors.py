@@ -102,9 +102,9 @@ def _open_zeros(
 ) -> dict[str, float]:
     """Return what a record leaves open of the zeros of its sensors, in deviations.
 
-    A constant beside the motion is told by the record where the model has none of its own: of what
-    it is not, nothing widens an interval. What it seems to be counts with its deviation, for it was
-    not taken out. Without noise the zero of alpha alone made intervals as wide as their values.
+    A constant error of a sensor shows in the record where the model has none of its own: of what
+    it is not, nothing widens an interval. What it seems to be counts with its deviation, for it is
+    not taken out. Without noise the zero of alpha alone makes intervals as wide as their values.
     """
     zeros = [
         one
@@ -124,8 +124,8 @@ def _open_zeros(
         [1.0 / wider] * len(zeros),
     )
     left = np.hypot(step.added, wider * np.sqrt(np.diag(step.covariance)))
-    told = zip(zeros, left, strict=True)
-    return {one.error: float(size) for one, size in told if size < POSTERIOR_PRIOR_RATIO}
+    known_zeros = zip(zeros, left, strict=True)
+    return {one.error: float(size) for one, size in known_zeros if size < POSTERIOR_PRIOR_RATIO}
 
 
 def systematic_residuals(

@@ -33,7 +33,7 @@ from host.sysid.aerodynamics.path_thrust import rotor_means
 from host.sysid.aerodynamics.thrust_terms import thrust_terms
 from host.sysid.aerodynamics.unmeasured_motion import with_unmeasured
 from host.sysid.aerodynamics.varying_airspeed import LIFT_TERMS, MEASURED, VaryingModel
-from host.sysid.errors.departure import Departure, expected_beside, with_second_order
+from host.sysid.errors.departure import Departure, expected_nuisance, with_second_order
 from host.sysid.errors.one_step import CERTAIN_SD, HALF_WAY, OneStep, Step, one_step_of
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
@@ -67,7 +67,7 @@ class _Departing:
         With these inputs.
     cuts : list of mapping
         All columns of each, those that nobody measured guessed.
-    beside : dict
+    nuisance : dict
         Terms that a template has not: what is expected, and one deviation.
     thrust : dict
         What thrust is expected to do.
@@ -80,14 +80,14 @@ class _Departing:
     varying: VaryingModel
     data: list[Maneuver]
     cuts: list[Mapping[str, Array]]
-    beside: dict[str, tuple[float, float]]
+    nuisance: dict[str, tuple[float, float]]
     thrust: dict[str, float]
     polar: dict[str, tuple[float, float]]
 
     @property
     def along(self) -> dict[str, float]:
         """What is estimated along, and one deviation of each."""
-        return {name: sd for name, (_, sd) in (self.polar | self.beside).items()}
+        return {name: sd for name, (_, sd) in (self.polar | self.nuisance).items()}
 
     @property
     def expected(self) -> dict[str, float]:
@@ -118,11 +118,11 @@ class _Departing:
             name: self.expected.get(name, 0.0) + float(value)
             for name, value in zip(self.along, step.added, strict=True)
         }
-        # What is fitted with thrust has the drag polar beside it.
+        # What is fitted with thrust has the drag polar too.
         polar = self.polar if self.thrust else {}
         return Departure(
             step.shares, tuple(open_ones), self.varying, self.model(known),
-            tuple(self.data), polar | self.beside,
+            tuple(self.data), polar | self.nuisance,
         )  # fmt: skip
 
 
@@ -197,7 +197,7 @@ def _departing(
     whole = [with_unmeasured(c, base, result.estimate, trim) for c in cuts]
     thrust = thrust_terms(base, whole, trim, airframe)
     varying = VaryingModel(base, base.name, trim, airframe, spin, left_out, thrust)
-    beside = expected_beside(result, (*left_out, *thrust))
+    nuisance = expected_nuisance(result, (*left_out, *thrust))
     return _Departing(
         base,
         trim,
@@ -207,8 +207,8 @@ def _departing(
             for m, c in zip(maneuvers, whole, strict=True)
         ],
         list(whole),
-        beside,
-        {t.name: beside[t.name][0] for t in thrust},
+        nuisance,
+        {t.name: nuisance[t.name][0] for t in thrust},
         _polar(result, trim, pitching=not thrust),
     )
 
@@ -281,7 +281,7 @@ def _polar(result: FitResult, trim: Trim, *, pitching: bool) -> dict[str, tuple[
 
     Left out, M_q was 1.8 % off in calm air, and the test of coherence named ax. Lift of pitching
     drags by anything from nothing, where a tail makes it, to all that the polar has for it, evenly:
-    left out, CD_de was low by two to four half-widths where drag follows all lift. Beside measured
+    left out, CD_de is low by two to four half-widths where drag follows all lift. With measured
     thrust, where the polar is fitted at once with it, it is not tried.
     """
     if "ax_mps2" not in result.model.outputs or "D_alpha" not in result.names:

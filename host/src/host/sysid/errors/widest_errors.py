@@ -13,7 +13,7 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.uncertainty import Uncertainty
 
 NOISE = "noise and gusts"
-BESIDE = "maneuvers that differ, motion beside the model"
+OUTSIDE_MODEL = "maneuvers that differ, motion outside the model"
 
 
 def widest_errors(
@@ -27,14 +27,14 @@ def widest_errors(
     fit : FitResult
         As estimated: noise alone.
     statistical : FitResult
-        With scatter of the maneuvers and what inputs drive beside the model.
+        With scatter of the maneuvers and what inputs drive outside the model.
     total : Uncertainty
         With the systematic errors.
     shifts : sequence of ShiftedEstimate
         Of one deviation of each systematic error.
     """
     noise = np.diag(fit.covariance)
-    parts = {NOISE: noise, BESIDE: np.maximum(np.diag(statistical.covariance) - noise, 0.0)}
+    parts = {NOISE: noise, OUTSIDE_MODEL: np.maximum(np.diag(statistical.covariance) - noise, 0.0)}
     for shift in shifts:
         label = error_label(shift.error)
         moved = (shift.estimate - statistical.estimate) ** 2

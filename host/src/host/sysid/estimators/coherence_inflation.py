@@ -42,7 +42,7 @@ def driven_by_inputs(
     found: InputCoherence | None,
     excess: NoiseExcess | None = None,
 ) -> ModelError | None:
-    """Return what the inputs drive beside the model.
+    """Return what the inputs drive outside the model.
 
     Intervals hold it where it is suspected at 10 %, and it is said at 1 %. The bias by the error
     that the residual looks most like is a shift: of output error as it is, of other methods in

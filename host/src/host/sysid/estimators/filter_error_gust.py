@@ -1,4 +1,4 @@
-"""Filter error with the gust as a state, delays estimated beside it."""
+"""Filter error with the gust as a state, delays estimated with it."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def fit_with_gust(
     *,
     roughly: bool = False,
 ) -> GustFit:
-    """Fit a template by filter error with the gust as a state, delays estimated beside it.
+    """Fit a template by filter error with the gust as a state, delays estimated with it.
 
     Parameters
     ----------

@@ -3,7 +3,7 @@
 The record's needs no model: chirp-z transforms of whole records, averaged
 over records and neighbouring lines. Pieces of a sweep (Welch) would hold each frequency in one of
 them only, and one piece is always coherent. Where a model has several inputs each response is the
-one beside the others, and coherence is partial: inputs that move together would else be taken for
+one next to the others, and coherence is partial: inputs that move together would else be taken for
 each other (Bendat & Piersol, Random Data, ch. 7).
 """
 
@@ -40,7 +40,7 @@ class RecordedResponse:
     frequency_hz : (f,) Array
         From two periods of the window on.
     response : (f, outputs, inputs) array, complex
-        Outputs over inputs; beside the other inputs where there are several.
+        Outputs over inputs; given the other inputs where there are several.
     coherence : (f, outputs, inputs) Array
         Ordinary of one input, partial of several.
     window_s : float

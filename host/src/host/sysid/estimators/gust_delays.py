@@ -1,4 +1,4 @@
-"""Delays of the sensors, estimated by filter error beside the gust.
+"""Delays of the sensors, estimated by filter error with the gust.
 
 Output error takes the gust for noise of the sensors. What a gust does to vane, gyro and
 accelerometers then passes for delays: on simulated flights without any, gusts of 1 m/s, it found 16
@@ -35,7 +35,7 @@ ROUNDS = 3
 PADE_STATES = 3
 SHORTEST_SHARE = 0.2  # of a sample: least delay that is left of a vane's, set back by one
 # Of a sample, one deviation: what a line between samples of a moving surface, and gusts of another
-# form, pass for. 0.2 to 0.6 ms of an IMU without any were found at 10 ms, known to 0.2. Beside the
+# form, pass for. 0.2 to 0.6 ms of an IMU without any are found at 10 ms, known to 0.2. Given the
 # delay that the line makes of the surface parameters are right (M_q +0.2 % at -0.4 ms, 50 flights
 # in calm air, where 0.2 ms counted in full made its interval 1.6 times as wide): of them only
 # gusts count it.
@@ -66,7 +66,7 @@ class DelayEstimate:
     delays : dict
         Value and 95 % half-width of each, s.
     estimate : Array, shape (P,)
-        Parameters beside them.
+        Parameters estimated with them.
     covariance : Array, shape (P, P)
         What the uncertain delays add to that of the parameters.
     """
@@ -114,10 +114,10 @@ def estimate_delays(
         delays = {d.name: (0.0, float(half[first.index(d.name)])) for d in groups}
         return DelayEstimate(delays, estimate, _added_covariance(first, list(values), count))
     found = _known_no_better(found, vanes, np.inf if by_prior else GUST_FORM)
-    told, counted = _with_what_passes(found, groups, model, maneuvers, airspeed_mps)
-    half = NORMAL_95 * told.standard_error
+    uncertain, counted = _with_what_passes(found, groups, model, maneuvers, airspeed_mps)
+    half = NORMAL_95 * uncertain.standard_error
     return DelayEstimate(
-        {n: (v, float(half[told.index(n)])) for n, v in values.items()},
+        {n: (v, float(half[uncertain.index(n)])) for n, v in values.items()},
         estimate,
         _added_covariance(counted, list(values), count),
     )

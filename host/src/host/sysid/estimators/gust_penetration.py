@@ -20,7 +20,7 @@ from host.sysid.models.state_space_model import LinearModel, Parameter, Term
 PREFIX = "gust_"
 GUST_LAG = "gust_lag_radps"
 ROLL_LAG = "gust_roll_lag_radps"
-TURNED = (("alpha_rad", "q_radps"), ("beta_rad", "r_radps"))  # angles and the rates beside them
+TURNED = (("alpha_rad", "q_radps"), ("beta_rad", "r_radps"))  # angles and their rates
 ROLL_STATES = frozenset({"beta_rad", "p_radps"})  # of a model that air may roll
 # The air turns within the time to fly this far, a tail arm or more, and rolls within 4 b/pi
 # (MIL-F-8785C, 3.7.5) of models of 1.2 to 2.5 m span. At the lower end of that range the prior made
@@ -31,7 +31,7 @@ GENEROUS = 2.0  # deviations of the effect, in effects of the same rate and angl
 
 
 def penetration_name(parameter: str) -> str:
-    """Return what the effect of turning air is called beside the effect of the aircraft's own."""
+    """Return what the effect of turning air is called, apart from that of the aircraft's own."""
     return f"{PREFIX}{parameter.split('_')[0]}"
 
 
@@ -78,8 +78,8 @@ def _effects(
             own = [
                 t for t in model.terms if t.matrix == "A" and (t.row, t.column) == (term.row, alpha)
             ]
-            beside = sum(size[t.parameter] for t in own)
-            effects[penetration_name(term.parameter)] = lag * size[term.parameter] + beside
+            direct = sum(size[t.parameter] for t in own)
+            effects[penetration_name(term.parameter)] = lag * size[term.parameter] + direct
     return tuple(
         Parameter(name, prior_sd=GENEROUS * sd) for name, sd in effects.items() if sd > 0.0
     )

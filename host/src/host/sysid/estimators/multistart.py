@@ -47,7 +47,7 @@ def multistart(
 ) -> Optimum:
     """Return the best optimum of white-noise output error found from `theta` and other starts.
 
-    Of equations of a user it is the one that is reached from `theta`, or beside it by the delay of
+    Of equations of a user it is the one that is reached from `theta`, or next to it by the delay of
     a control.
 
     Parameters

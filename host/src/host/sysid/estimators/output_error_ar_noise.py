@@ -8,8 +8,8 @@ Here
    likelihood (`ar_noise.lagged_moments`);
 2. output error is fitted again with the whitened likelihood, which gives the efficient estimate and
    an interval near the Cramer-Rao bound of known noise;
-3. where the inputs drive the residual, the noise is estimated beside what they drive, and the fit
-   repeated (`refit_beside_inputs`): noise may not explain what the model lacks;
+3. where the inputs drive the residual, the noise is estimated without what they drive, and the fit
+   repeated (`refit_without_driven`): noise may not explain what the model lacks;
 4. the uncertainty of the noise model widens the interval by a t quantile, its degrees of freedom
    after Satterthwaite.
 """
@@ -114,13 +114,13 @@ def fit_with_ar_noise(
     return ArNoiseFit(optimum, covariance, covariance_white, dof, tuple(noise), variance, refits)
 
 
-def refit_beside_inputs(
+def refit_without_driven(
     problem: OutputProblem, fit: ArNoiseFit, *, highest_order: int = HIGHEST_ORDER
 ) -> tuple[ArNoiseFit, InputCoherence]:
     """Fit again where the noise explained what the inputs drive; return also how they are coherent.
 
-    The noise of a fit whose residual is coherent with the inputs is estimated beside what they
-    drive. With it the model's error weighs what it weighs, and is not whitened away.
+    The noise of a fit whose residual is coherent with the inputs is estimated without what
+    they drive. With it the model's error weighs what it weighs, and is not whitened away.
 
     Parameters
     ----------
@@ -132,15 +132,15 @@ def refit_beside_inputs(
     found = input_coherence(problem, fit.optimum.responses, fit.optimum.theta)
     if not found.coherent or all(n.order == 0 for n in fit.noise):
         return fit, found
-    beside = input_coherence(
+    coherence = input_coherence(
         problem, fit.optimum.responses, fit.optimum.theta, highest_order=highest_order, block_s=0.0
     )
     known = np.isfinite(problem.known_variance)  # known noise is white
     noise = tuple(
-        ArNoise.white() if fixed else n for n, fixed in zip(beside.noise, known, strict=True)
+        ArNoise.white() if fixed else n for n, fixed in zip(coherence.noise, known, strict=True)
     )
     optimum = minimise(problem, fit.optimum.theta, noise=noise)
-    variance = _innovation_variances(problem, optimum, noise, beside.innovation_variance)
+    variance = _innovation_variances(problem, optimum, noise, coherence.innovation_variance)
     covariance = _covariance(problem, optimum, noise, variance)
     dof = _satterthwaite(problem, optimum, noise, variance, covariance)
     again = ArNoiseFit(

@@ -12,7 +12,7 @@ from host.sysid.estimators.coherence_inflation import driven_by_inputs
 from host.sysid.estimators.output_error_ar_noise import (
     ArNoiseFit,
     fit_with_ar_noise,
-    refit_beside_inputs,
+    refit_without_driven,
 )
 from host.sysid.estimators.start_values import start_values
 from host.sysid.models.fit_result import FitResult
@@ -49,7 +49,7 @@ def fit_output_error(
         Model and data; the states need not be measured.
     coloured_noise : bool
         Estimate AR models of the noise, refit with them and base the intervals on them (default);
-        where the inputs drive the residual, noise is estimated beside that and intervals are wider.
+        where the inputs drive the residual, noise is estimated without it and intervals are wider.
         Otherwise the noise is taken as white for the estimate, and the covariance is corrected by
         the residual autocorrelation (Morelli & Klein 1997), the standard that covers 87-90 %.
     start : Array, optional
@@ -57,7 +57,7 @@ def fit_output_error(
     highest_order, criterion, multiple_starts, restarts
         See `fit_with_ar_noise`.
     model_error : bool
-        Hold what the inputs drive beside the model; without, noise alone.
+        Hold what the inputs drive outside the model; without, noise alone.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def fit_output_error(
     )
     coherence = None
     if coloured_noise and highest_order > 0:
-        fit, coherence = refit_beside_inputs(problem, fit, highest_order=highest_order)
+        fit, coherence = refit_without_driven(problem, fit, highest_order=highest_order)
     result = _result(problem, fit, coloured_noise)
     if coherence is None or not model_error:
         return result

@@ -64,7 +64,7 @@ class DelayProfile:
 
     @property
     def hollows(self) -> list[float]:
-        """The delays asked that cost less than both beside them."""
+        """The delays tried that cost less than both neighbours."""
         at = sorted(self.costs)
         costs = [np.inf, *(self.costs[d] for d in at), np.inf]
         return [d for k, d in enumerate(at) if costs[k + 1] < min(costs[k], costs[k + 2])]
@@ -99,14 +99,14 @@ class CoarseDelays:
 
     @property
     def hollows(self) -> list[float]:
-        """The delays that cost less than both beside them."""
+        """The delays that cost less than both neighbours."""
         return self._asked.hollows
 
 
 def _cost(found: FitResult, data: Sequence[Maneuver]) -> float:
     """Return minus the logarithm of the likelihood of a fit, but for a constant.
 
-    Of output error in noise with a memory, estimated beside; innovations are white.
+    Of output error in noise with a memory, estimated too; innovations are white.
     """
     if found.residual_kind == "innovation":
         # What was not measured has no innovation, and zeros would pass for small ones in their

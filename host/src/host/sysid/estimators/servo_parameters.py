@@ -9,8 +9,8 @@ What output error leaves is weighed as noise with a memory. Gusts are slow, a de
 edges of the inputs: as white noise the gusts hid it there (0.5 m/s, no vanes: -7 to 13 ms of 2,
 and L_p went with it by 4 % a millisecond), whitened it is known to 2 ms.
 
-Bandwidth and rate limit are carried: 1 / (2 pi f) is a delay too, and a free bandwidth beside a
-free delay drew the filter to 3.5 Hz on thor75, where 6 Hz and 50 ms were published.
+Bandwidth and rate limit are carried: 1 / (2 pi f) is a delay too, and a free bandwidth with a
+free delay draws the filter to 3.5 Hz on thor75, where 6 Hz and 50 ms are published.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class ServoEstimate:
     numbers : tuple of ServoNumber
         In the order of `SERVO`.
     names : tuple of str
-        Common parameters of the model that they were estimated beside.
+        Common parameters of the model that they are estimated with.
     covariance : Array, shape (P, P)
         What the uncertain servo adds to that of these.
     correlation : dict
@@ -196,7 +196,7 @@ def _least(profile: DelayProfile, step: float) -> tuple[float, float, float, flo
                 break
         below, above = round(best - step, 5), round(best + step, 5)
         if below not in profile.costs or above not in profile.costs:
-            raise IdentificationError("the fit does not come about beside the best delay")
+            raise IdentificationError("the fit fails next to the best delay")
         low, least, high = (profile.costs[d] for d in (below, best, above))
         curvature = max((low - 2.0 * least + high) / step**2, profile.prior.sd[0] ** -2)
         delay = float(np.clip(best - 0.5 * (high - low) / step / curvature, below, above))

@@ -58,7 +58,7 @@ def choose_terms(
 def _best_to_enter(
     X: Array, y: Array, selected: Sequence[int], rss: float
 ) -> tuple[int, float, float]:
-    """Return the regressor of the largest partial F beside those selected, F and what it leaves.
+    """Return the regressor of the largest partial F given those selected, F and what it leaves.
 
     It is -1 where none leaves less.
     """

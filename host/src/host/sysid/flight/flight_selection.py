@@ -74,7 +74,7 @@ def _recorded(source: Path, mapping: Path | None) -> list[int]:
         lines = read_map(mapping, ("t_s", *USED))
         columns = mapped(columns, found.unusable, lines, mapping, found.twice)
     if "t_s" not in columns:
-        raise IdentificationError(f"{source}: no column t_s: its flights cannot be told apart")
+        raise IdentificationError(f"{source}: no column t_s: its flights cannot be separated")
     columns = columns | {"t_s": counted_on(columns["t_s"], [])}
     parts = recordings(columns["t_s"])
     length = len(columns["t_s"])

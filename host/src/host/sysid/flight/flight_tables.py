@@ -114,7 +114,7 @@ def read_flight_columns(
     calibration : Path, optional
         Calibration of a log; the default one without.
     also : collection of str
-        Signals of a model of one's own, beside those that are always looked for.
+        Signals of a model of one's own, besides those that are always looked for.
     equations : collection of str
         Columns that a model reads: what others miss divides no maneuver. Empty: it may be any.
     accept : collection of str

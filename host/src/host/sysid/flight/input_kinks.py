@@ -15,7 +15,7 @@ import numpy as np
 from host.arrays import Array
 from host.sysid.numerics.between_samples import shared_by_samples
 
-# Times the curvature beside it. A servo of second order and 30 rad/s has none at 10 ms, one of 60
+# Times the curvature next to it. A servo of second order and 30 rad/s has none at 10 ms, one of 60
 # rad/s passes for one: 0.2 ms.
 KINK_FROM = 4.0
 
@@ -30,10 +30,10 @@ def with_means_of_motion(values: Array) -> Array:
     """
     if len(values) < 5:
         return values
-    return shared_by_samples(values, _mean_beside_line(values))
+    return shared_by_samples(values, _mean_off_line(values))
 
 
-def _mean_beside_line(values: Array) -> Array:
+def _mean_off_line(values: Array) -> Array:
     """Return the mean of the motion less that of the line, of every interval, (n - 1,)."""
     bend = np.zeros(len(values) + 2)
     bend[2:-2] = np.diff(values, n=2)

@@ -103,8 +103,8 @@ class ReconstructedFlight:
     def least_noise(self) -> dict[str, float]:
         """Least deviation of the noise of columns whose error lasts from sample to sample.
 
-        Of our own instrument where it is known: a delay of the vanes that is estimated beside the
-        gust leans on pitch, and was lost without it (18 ms found as 0).
+        Of our own instrument where it is known: a delay of the vanes that is estimated with the
+        gust depends on pitch, and is lost without it (18 ms found as 0).
         """
         known = self.compatibility is not None and self.compatibility.instrument is not None
         return {"theta_rad": OWN_ATTITUDE_RAD} if known and self.maker == OWN else {}

@@ -93,7 +93,7 @@ def _with_gust(airspeed_mps: float) -> Fit:
         # Afresh each time: from its neighbour's end the filter ran to a delay of 0.16 s on thor75.
         found = fit_gust_state(model, list(data), airspeed_mps, start_values_of(model, data))
         if found.residual_kind != "innovation":
-            raise IdentificationError("the filter did not converge beside them")
+            raise IdentificationError("the filter did not converge with the servos")
         return found
 
     return by

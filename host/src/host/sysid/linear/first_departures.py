@@ -1,8 +1,8 @@
 """Departures from the trim at a first, white fit, taken out before anything finer is fitted.
 
 Where no vane measured the angles, white output error is the method. What airspeed and attitude do
-beside the model then passes for noise and for a lag of the inputs: on a flight in calm air q was
-explained to 9.5 % with it and to 1.0 % without, and the servos came out 6 ms late.
+outside the model then passes for noise and for a lag of the inputs: on a flight in calm air q is
+explained to 9.5 % with it and to 1.0 % without, and the servos come out 6 ms late.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from host.sysid.aerodynamics.thrust_terms import beside_thrust, thrust_terms
+from host.sysid.aerodynamics.thrust_terms import thrust_terms, with_thrust_input
 from host.sysid.errors.departure import without_further_inputs
 from host.sysid.errors.trim_departure import correct_trim_departure
 from host.sysid.estimators.filter_error_gust import fit_with_gust
@@ -43,13 +43,13 @@ def fit_gust_at_trim(columns: PreparedColumns) -> LinearFit:
 def _first_fit(columns: PreparedColumns) -> tuple[dict[str, float] | None, Sequence[Maneuver]]:
     """Return a first estimate with the gust, none if it gets lost, and the maneuvers at the trim.
 
-    Thrust that changed stands beside the model there.
+    Thrust that changed is a further input of the model there.
     """
     chosen, data, cuts = columns.chosen, columns.data, columns.cuts
     trim, airframe = chosen.trim, columns.airframe
     bare = replace(chosen.model, delays=())
     thrust = thrust_terms(bare, cuts, trim, airframe)
-    wide, driven = beside_thrust(bare, data, cuts, thrust, trim) if thrust else (bare, data)
+    wide, driven = with_thrust_input(bare, data, cuts, thrust, trim) if thrust else (bare, data)
     rough = fit_with_gust(wide, driven, trim.airspeed_mps, roughly=True).result
     even = None  # as if thrust had not changed
     if thrust:

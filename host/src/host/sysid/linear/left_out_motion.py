@@ -1,4 +1,4 @@
-"""A reduced template fitted with the measured motion that it leaves out beside it.
+"""A reduced template fitted with the measured motion that it leaves out.
 
 Its own parameters are then those of the whole aircraft, and what is not known of the terms left
 out is in their intervals. On records of 1.5 to 5 s of a trainer N_beta of `dutch-roll` was 16 to
@@ -41,14 +41,14 @@ LIKELY_SD = 2.0
 def unaccounted_motion(
     chosen: ChosenModel, found: LinearFit, departure: Departure | None
 ) -> tuple[str, ...]:
-    """Return what moves beside a template, acts in its equations and is in no interval."""
+    """Return what moves outside a template, acts in its equations and is in no interval."""
     if chosen.own or departure is not None:
         return found.left_out
     needed = NEEDED.get(found.model.name, ())
     return tuple(c for c in needed if c not in found.model.states)
 
 
-def fit_beside_left_out(
+def fit_with_left_out(
     method: str, columns: PreparedColumns, options: Mapping[str, object]
 ) -> LinearFit | None:
     """Return the fit of a reduced template; None of another, or where what it needs is missing.
@@ -148,14 +148,14 @@ def _first_with_gust(
 def _alone(
     wide: FitResult, found: Departure, model: LinearModel, data: Sequence[Maneuver]
 ) -> LinearFit:
-    """Return a fit on the template, what is not known of the terms beside it in its covariance."""
-    attenuated = {t.name: found.beside[t.name][1] for t in found.varying.left_out if t.attenuated}
+    """Return a fit on the template, what is not known of the added terms in its covariance."""
+    attenuated = {t.name: found.nuisance[t.name][1] for t in found.varying.left_out if t.attenuated}
     wide = _known_no_better(wide, attenuated)
-    result = without_parameters(wide, model, list(found.beside))
+    result = without_parameters(wide, model, list(found.nuisance))
     unlikely = [
         term.column
         for term in found.varying.left_out
-        for mean, sd in [found.beside[term.name]]
+        for mean, sd in [found.nuisance[term.name]]
         if abs(wide.value(term.name) - mean) > LIKELY_SD * sd
     ]
     return LinearFit(
@@ -187,7 +187,7 @@ def _known_no_better(wide: FitResult, deviations: Mapping[str, float]) -> FitRes
 def _fit(
     method: str, wide: LinearModel, data: Sequence[Maneuver], options: Mapping[str, object]
 ) -> FitResult:
-    """Fit with delays; held where they are if the search does not end beside them.
+    """Fit with delays; held where they are if the search does not end with them.
 
     Measured columns that drive a model carry noise, and what is interpolated between noisy samples
     has a kink where a delay passes a sample: a search may stay there.

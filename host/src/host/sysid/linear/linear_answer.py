@@ -62,8 +62,8 @@ class Answer:
     coefficient_parts: CoefficientParts | None = None
     errors: tuple[ErrorSource, ...] = ()  # that widen its intervals
     standard_delays: tuple[DelayGroup, ...] = STANDARD_DELAYS  # that its sensors may have
-    thrust: ThrustColumn | None = None  # that was measured and changed, beside the model
-    left_out: tuple[str, ...] = ()  # motion beside a reduced template that nothing accounts for
+    thrust: ThrustColumn | None = None  # that was measured and changed, apart from the model
+    left_out: tuple[str, ...] = ()  # motion outside a reduced template that nothing accounts for
     causes: dict[str, str] = field(default_factory=dict)  # what widens each interval most
     held_out_runs: tuple[
         tuple[Maneuver, Array], ...

@@ -1,7 +1,7 @@
 """A model fitted to prepared columns: what depends on the estimate is taken out of the outputs.
 
 Delays of the sensors and departures from the trim are known only with the model. They go out where
-it is fitted, by one of four ways: with what a template leaves out beside it (`left_out_motion`),
+it is fitted, by one of four ways: with what a template leaves out (`left_out_motion`),
 with the gust as a state (`gust_at_trim`), a user's own model, or a template by one method.
 """
 
@@ -17,7 +17,7 @@ from host.sysid.estimators.method_fit import fit, refuse_unless_finite
 from host.sysid.flight.column_change import ColumnChange, Record
 from host.sysid.linear.first_departures import remove_departures
 from host.sysid.linear.gust_at_trim import fit_gust_at_trim
-from host.sysid.linear.left_out_motion import fit_beside_left_out
+from host.sysid.linear.left_out_motion import fit_with_left_out
 from host.sysid.linear.linear_stages import LinearFit
 from host.sysid.linear.model_names import DEFAULT_METHOD, GUST
 from host.sysid.linear.prepared_columns import PreparedColumns
@@ -102,11 +102,11 @@ def _template(columns: PreparedColumns, options: Mapping[str, object]) -> Linear
     single = f"{OUTPUT_ERROR}-white" if lost else chosen.method
     if single.startswith(OUTPUT_ERROR):
         options = {"multiple_starts": False, "model_error": False, **options}
-    beside = None
+    wide = None
     if chosen.gust_is_state or single.startswith(OUTPUT_ERROR):
-        beside = fit_beside_left_out(single, columns, options)
-    if beside is not None:
-        return beside
+        wide = fit_with_left_out(single, columns, options)
+    if wide is not None:
+        return wide
     if chosen.gust_is_state:
         return fit_gust_at_trim(columns)
     return _by_one_method(single, columns, options)

@@ -41,7 +41,7 @@ from host.sysid.reconstruction.sensor_dynamics import DELAYED_COLUMNS, IMU_DELAY
 from host.sysid.validation.free_simulation import FreeResponses, free_responses
 from host.sysid.validation.noise_model_limits import excess_over_noise_model
 
-WHITE = "output error (white)"  # its noise is judged beside what the inputs drive
+WHITE = "output error (white)"  # its noise is judged without what the inputs drive
 
 
 def linear_intervals(estimate: LinearEstimate, powerplant: Powerplant | None) -> LinearIntervals:
@@ -74,7 +74,7 @@ def linear_intervals(estimate: LinearEstimate, powerplant: Powerplant | None) ->
 
 
 def _statistical(e: LinearEstimate) -> tuple[FitResult, InputCoherence | None]:
-    """Return the estimate at its trim, and what the inputs drive beside the model.
+    """Return the estimate at its trim, and what the inputs drive outside the model.
 
     Noise and what the model lacks are in its covariance.
     """
@@ -122,12 +122,12 @@ def _with_model_error(
 
 
 def _coherence(e: LinearEstimate, free: FreeResponses) -> InputCoherence:
-    """Return what the inputs drive beside the model and what the instrument's file leaves open."""
+    """Return what the inputs drive outside the model and what the instrument's file leaves open."""
     known = [c for c in _carriers(e) if c is not None]
-    beside: list[Array] = []
+    nuisance: list[Array] = []
     if len(known) == len(e.columns.used):
-        beside = systematic_residuals(free.problem, free.theta, e.columns.cuts, known, e.trim)
-    return input_coherence(free.problem, free.responses, free.theta, beside=beside)
+        nuisance = systematic_residuals(free.problem, free.theta, e.columns.cuts, known, e.trim)
+    return input_coherence(free.problem, free.responses, free.theta, nuisance=nuisance)
 
 
 def _carriers(e: LinearEstimate) -> list[Compatibility | None]:
@@ -138,9 +138,9 @@ def _carriers(e: LinearEstimate) -> list[Compatibility | None]:
 
 def _shifts(e: LinearEstimate, statistical: FitResult) -> tuple[ShiftedEstimate, ...]:
     """Return the estimate moved by one deviation of every systematic error."""
-    # What was fitted beside the model would pass for what is open of sensors and surfaces.
-    beside = e.departure is not None and bool(e.departure.beside)
-    fitted = e.at_trim(e.estimate) if beside else list(e.found.maneuvers)
+    # What was fitted in addition to the model would pass for what is open of sensors and surfaces.
+    extended = e.departure is not None and bool(e.departure.nuisance)
+    fitted = e.at_trim(e.estimate) if extended else list(e.found.maneuvers)
     return (
         *(() if e.departure is None else e.departure.remainders),
         *_by_sensors(e, statistical, fitted),

@@ -312,8 +312,8 @@ def imu_place_m(i: SensorErrorModel) -> float:
 def with_drag_arm(model: LinearModel, trim: Trim, i: SensorErrorModel) -> LinearModel:
     """Free the height of the accelerometers where drag is fitted: a pitch rate makes none.
 
-    Every other place is carried. This one moves drag by more than its size, and the pitch rate
-    beside angle and elevator tells it.
+    Every other place is carried. This one moves drag by more than its size, and the pitch rate,
+    with angle and elevator, determines it.
     """
     if "ax_mps2" not in model.outputs:
         return model

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from host.arrays import Array
 from host.instrument.error_sources import ErrorSource
 from host.sysid.aerodynamics.coefficient_table import CoefficientParts, ShiftedEstimate
-from host.sysid.aerodynamics.thrust_terms import THRUST_BESIDE
+from host.sysid.aerodynamics.thrust_terms import THRUST_AS_INPUT
 from host.sysid.errors.departure import Departure
 from host.sysid.flight.column_change import Record
 from host.sysid.linear.prepared_columns import PreparedColumns
@@ -41,7 +41,7 @@ class LinearFit:
     at_trim : tuple of Maneuver or None
         What the result was fitted to, where departures had been removed from it.
     departure : Departure or None
-        What was fitted beside a template.
+        What was fitted in addition to a template.
     left_out : tuple of str
         Columns of which that fit says what no aircraft has.
     remarks : tuple of str
@@ -73,7 +73,7 @@ class LinearEstimate:
     record : tuple of ColumnChange
         What was done to which columns, from the flight to the fit.
     left_out : tuple of str
-        Columns that act beside a reduced template, and that the fit does not account for.
+        Columns that act and are not in a reduced template, and that the fit does not account for.
     """
 
     columns: PreparedColumns
@@ -99,7 +99,7 @@ class LinearEstimate:
 
     @property
     def noise(self) -> Uncertainty:
-        """What the noise of the fit leaves open, what each maneuver says at the trim beside it."""
+        """What the noise of the fit leaves open, and what each maneuver says at the trim."""
         moved = {} if self.departure is None else self.departure.influence(self.fit.details)
         return replace(self.fit.uncertainty, details={**self.fit.details, **moved})
 
@@ -113,7 +113,7 @@ class LinearEstimate:
             *prepared,
             *self.found.remarks,
             *self.fit.warnings,
-            *((THRUST_BESIDE,) if thrust else ()),
+            *((THRUST_AS_INPUT,) if thrust else ()),
         )
 
     def at_trim(self, estimate: Array) -> list[Maneuver]:
@@ -130,10 +130,10 @@ class LinearIntervals:
     Attributes
     ----------
     statistical : FitResult
-        The estimate at its trim; noise, scatter of maneuvers and what inputs drive beside the model
-        are in its covariance.
+        The estimate at its trim; noise, scatter of maneuvers and what inputs drive outside the
+        model are in its covariance.
     coherence : InputCoherence or None
-        What the inputs drive beside the model.
+        What the inputs drive outside the model.
     shifts : tuple of ShiftedEstimate
         The estimate moved by each systematic error.
     errors : tuple of ErrorSource
@@ -157,7 +157,7 @@ class LinearValidation:
     """Free simulation of the maneuvers fitted, and of those held out.
 
     Departures from the trim are as measured: airspeed and attitude in products with what moves.
-    `predictions` sets the error of each output held out beside what noise and covariance allow;
+    `predictions` compares the error of each output held out with what noise and covariance allow;
     `held_out_runs` are the maneuvers held out, with their outputs.
     """
 

@@ -16,5 +16,5 @@ DEFAULT_METHOD = "flight"
 STAGED = {
     "flight": "gust filter where alpha is a measured state; beta too, of our log only with an"
     " aircraft file, of dutch-roll where the data show gusts (default)",
-    GUST: "filter error with the gust as a state, delays estimated beside it",
+    GUST: "filter error with the gust as a state, delays estimated with it",
 }

@@ -34,7 +34,7 @@ FITTED_SHARE = 2.0 / 3.0  # of a maneuver, from its start
 
 
 def first_part(maneuver: Maneuver) -> Maneuver:
-    """Return what of a maneuver is fitted before the rest is told."""
+    """Return what of a maneuver is fitted before the rest is predicted."""
     count = round(FITTED_SHARE * maneuver.samples)
     sampled = None if maneuver.sampled is None else maneuver.sampled[:count]
     return replace(

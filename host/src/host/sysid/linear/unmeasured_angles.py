@@ -2,8 +2,8 @@
 
 Where alpha_dot = q + a_z / V, rates and specific force hold the angle but for a constant, and with
 it the derivatives (Klein & Morelli, Aircraft System Identification, ch. 10, on kinematics). The
-accelerometer's bias is then no parameter beside the angle's: only their sum is seen. What gusts do
-to the angle is not in it.
+accelerometer's bias is then no parameter of its own: only its sum with the angle's is seen. What
+gusts do to the angle is not in it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def without_vanes(
     able = [y for y in hidden if ACCELEROMETER_OF[y] in model.outputs]
     if able != hidden:
         wanted = " and ".join(ACCELEROMETER_OF[y] for y in hidden)
-        why = f"{wanted} beside the airspeed, or a vane, would tell it by this method"
+        why = f"{wanted} with the airspeed, or a vane, would determine it by this method"
         raise IdentificationError(f"{words} was not measured; {why}")
     across = {ACCELEROMETER_OF[y] for y in hidden}
     reduced = without_outputs(model, hidden)
@@ -43,6 +43,6 @@ def without_vanes(
         reduced, output_biases=tuple(y for y in reduced.output_biases if y not in across)
     )
     return reduced, (
-        f"no vane measured {words}: it is told by {', '.join(sorted(across))} and rates, gusts are"
+        f"no vane measured {words}: it comes from {', '.join(sorted(across))} and rates, gusts are"
         " in it",
     )

@@ -107,15 +107,15 @@ def fit_by_evidence(
         ahead = cost_by_residuals(model, still.result, maneuvers)
         ahead -= cost_by_innovations(model, moving, maneuvers, airspeed_mps)
         if ahead > 0.0:
-            line = f"{NOISE_CHOSEN}: gusts ({_told(ahead)} sensors' noise)"
+            line = f"{NOISE_CHOSEN}: gusts ({_likelier(ahead)} sensors' noise)"
             found = fit_users_model(by_filter, model, maneuvers, airspeed_mps, {})
             return replace(found, remarks=(line, *found.remarks))
     except IdentificationError as error:
         return replace(plain, remarks=(f"{NOISE_CHOSEN}: white; gust: {error}",))
-    return replace(plain, remarks=(f"{NOISE_CHOSEN}: white ({_told(-ahead)} gusts)",))
+    return replace(plain, remarks=(f"{NOISE_CHOSEN}: white ({_likelier(-ahead)} gusts)",))
 
 
-def _told(ahead: float) -> str:
+def _likelier(ahead: float) -> str:
     return f"what was not fitted is e^{ahead:.0f} times likelier than by"
 
 

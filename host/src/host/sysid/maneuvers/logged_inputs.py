@@ -1,4 +1,4 @@
-"""Inputs that the logger flew itself, as columns beside those it measured.
+"""Inputs that the logger flew itself, as columns next to those it measured.
 
 Nothing need be found where the log says it: the finder takes start, end and surfaces from here.
 """

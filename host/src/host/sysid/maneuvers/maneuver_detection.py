@@ -32,7 +32,7 @@ HOLD_S = 6.0  # longest step of an input
 SLOW = (0.007, 0.15)  # least swing of an input without edges: surfaces, throttle
 AWAY = 0.3  # of an input: a surface that is held further from its rest is not at rest
 OUT = 0.4  # of an input: the surface stands at one side
-WEAKER = 0.6  # of an input with edges: swings of the pilot beside it
+WEAKER = 0.6  # of an input with edges: swings of the pilot next to it
 SHORT_S = 20.0  # a record no longer than this was cut to its input
 TURNING = 0.3  # of the rates behind an edge: before it an aircraft in trim turns less
 PARTING_GAP_S = 5.0
@@ -377,7 +377,7 @@ def _with_logged_windows(
     found: list[DetectedManeuver],
     last_s: float,
 ) -> list[DetectedManeuver]:
-    """Return the inputs that the logger flew with their exact windows, and others beside them."""
+    """Return the inputs that the logger flew with their exact windows, and others next to them."""
     spans = [(start_s, end_s) for _, start_s, end_s in logged]
     others = [
         item

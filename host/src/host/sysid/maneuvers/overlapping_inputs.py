@@ -1,7 +1,7 @@
 """Inputs that overlap in time: which is but an echo of another, and which are flown together.
 
-A surface that moves beside another may be an input of its own, however small: 1.5 degrees of the
-elevator beside 5 of the rudder tell all of the longitudinal motion. What tells an echo is where its
+A surface that moves with another may be an input of its own, however small: 1.5 degrees of the
+elevator with 5 of the rudder show all of the longitudinal motion. What tells an echo is where its
 motion comes from: it follows the attitude (a pilot who takes over), or it swings faintly without an
 edge (handling, noise).
 """
@@ -45,9 +45,7 @@ def bounded(found: Sequence[DetectedManeuver], last_s: float) -> list[DetectedMa
     """End each window where an input begins that is not flown together with it."""
     result = []
     for item in found:
-        starts = (
-            f.start_s for f in found if f.start_s >= item.input_end_s and not _faint_beside(f, item)
-        )
+        starts = (f.start_s for f in found if f.start_s >= item.input_end_s and not _faint(f, item))
         limit_s = min(starts, default=last_s)
         result.append(replace(item, end_s=min(item.end_s, limit_s, last_s)))
     return result
@@ -74,7 +72,7 @@ def _echo(item: DetectedManeuver, other: DetectedManeuver, columns: Mapping[str,
     overlap = item.start_s < other.input_end_s and other.start_s < item.input_end_s
     if not overlap or not _weaker(item, other, WEAKER):
         return False
-    faint = item.swings and _faint_beside(item, other)
+    faint = item.swings and _faint(item, other)
     return faint or _follows_attitude(item, columns)
 
 
@@ -98,7 +96,7 @@ def _follows_attitude(item: DetectedManeuver, columns: Mapping[str, Array]) -> b
     return sign * both > 0.0 and explained
 
 
-def _faint_beside(other: DetectedManeuver, item: DetectedManeuver) -> bool:
+def _faint(other: DetectedManeuver, item: DetectedManeuver) -> bool:
     """Return whether another surface moves too little to matter in the response to an input."""
     return _weaker(other, item, FAINT)
 

@@ -46,7 +46,7 @@ def sustained_inputs(
     active = flying & (swing > ABOVE * quiet) & (_swing(_smoothed(series, dt_s), half) > least)
     found: list[tuple[int, int]] = []
     for first, last in _spans(active):
-        # Slow swings at both ends belong to it: small beside its own, but no rest yet.
+        # Slow swings at both ends belong to it: small against its own, but no rest yet.
         own = SMALL * float(np.median(swing[first : last + 1]))
         going = flying & (swing > max(own, LOW * quiet, LOW_SHARE * least))
         first, last = _run_about(going, first, last)

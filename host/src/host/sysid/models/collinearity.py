@@ -28,12 +28,12 @@ class Collinearity:
         return self.condition > CONDITION_LIMIT
 
 
-def collinearity(result: FitResult, beside: Collection[str] = ()) -> Collinearity:
+def collinearity(result: FitResult, left_out: Collection[str] = ()) -> Collinearity:
     """Return the collinearity of the estimates, some parameters left out.
 
     Klein & Morelli, Aircraft System Identification, ch. 5.
     """
-    asked = np.array([name not in beside for name in result.names])
+    asked = np.array([name not in left_out for name in result.names])
     estimated = np.flatnonzero(asked & (result.standard_error > 0.0))
     correlation = result.correlation[np.ix_(estimated, estimated)]
     values = np.linalg.eigvalsh(correlation)

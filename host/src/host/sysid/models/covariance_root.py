@@ -12,10 +12,10 @@ ALIKE = 1e6  # times larger: eigenvectors still have four digits
 def covariance_root(covariance: Array) -> Array:
     """Return R with R R' = covariance, (P, P); it may be singular.
 
-    Deviations of unlike size are first scaled to one. Beside two parameters that nothing tells
-    apart, with deviations of 1e11, eigenvectors of the bare matrix are rounding for all others:
-    noise that is estimated beside them had 30 times its variance, and intervals were four to nine
-    times too wide.
+    Deviations of unlike size are first scaled to one. With two parameters that nothing
+    separates, with deviations of 1e11, eigenvectors of the bare matrix are rounding for all others:
+    noise that is estimated with them gets 30 times its variance, and intervals four to nine
+    times their width.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ def model_text(
     trim : Trim, optional
         Gives a [trim] table: the condition the model is linearised about, to fly it again.
     thrust : ThrustColumn, optional
-        Gives a [thrust] table: what measured thrust does beside the model.
+        Gives a [thrust] table: what measured thrust adds to the model.
     """
     if has_equations(model):
         return equation_text(model, result)

@@ -1,4 +1,4 @@
-"""A model of the user's own equations, beside its tangent.
+"""A model of the user's own equations, with its tangent.
 
     x' = f(x, u, p) + b,   y = g(x, u, p) + c,   x(0) = x0
 
@@ -230,7 +230,7 @@ def _text(equations: Equations) -> str:
 
 @dataclass(frozen=True)
 class NonlinearModel(LinearModel):
-    """Equations of a user, beside their tangent as the linear model.
+    """Equations of a user, with their tangent as the linear model.
 
     Parameters
     ----------

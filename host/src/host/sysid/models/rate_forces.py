@@ -1,7 +1,7 @@
 """Lift and side force by turning, where no accelerometer tells them: known as aircraft have them.
 
-A vane that is late looks like them: without them a vane in time was found 8 ms early, and N_r of
-a trainer came out 11 % off, known to 2. They are small beside the known turning of the path.
+A vane that is late looks like them: without them a vane in time is found 8 ms early, and N_r of
+a trainer comes out 11 % off, known to 2. They are small against the known turning of the path.
 """
 
 from __future__ import annotations

@@ -82,7 +82,7 @@ def longitudinal(
         ("Z_de", "elevator_rad", -0.5, normal),
         ("D_dt", "throttle", 3.0, tangential),
     ]
-    # Without a_z the lift by q is negligible beside the known q.
+    # Without a_z the lift by q is negligible against the known q.
     for name, column, start, rows in forces if accelerometers else forces[1:]:
         model.add(name, start, [(row, column, gain) for row, gain in rows])
     moments = (
@@ -234,7 +234,7 @@ def roll(
     delays: tuple[DelayGroup, ...] = (),
     hold: str = "foh",
 ) -> LinearModel:
-    """Return the one-state roll model, bank angle measured beside the rate."""
+    """Return the one-state roll model, bank angle measured with the rate."""
     del trim, accelerometers, imu_sd_m
     states = ("p_radps", "phi_rad")
     model = ModelBuilder("roll", states, ("aileron_rad",), states)
@@ -247,7 +247,7 @@ def roll(
 def _side_force(model: ModelBuilder, trim: Trim, *, with_rates: bool) -> None:
     V = trim.airspeed_mps
     terms = [("beta", "beta_rad", -0.5), ("da", "aileron_rad", 0.0), ("dr", "rudder_rad", 0.3)]
-    if with_rates:  # without a_y they are negligible beside the known -cos(alpha) r
+    if with_rates:  # without a_y they are negligible against the known -cos(alpha) r
         terms[1:1] = [("p", "p_radps", 0.0), ("r", "r_radps", 0.0)]
     for label, column, start in terms:
         model.add(f"Y_{label}", start, [("beta_rad'", column, 1.0), ("ay_mps2", column, V)])

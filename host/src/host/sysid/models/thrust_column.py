@@ -1,7 +1,7 @@
-"""What measured thrust does beside a linear model: a column that only `predict` takes along.
+"""What measured thrust adds to a linear model: a column that only `predict` takes along.
 
 A model that is flown, converted or fitted again has surfaces for inputs; thrust is in the file
-beside its matrices.
+next to its matrices.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class ThrustColumn:
     rates_per_n: Array
     outputs_per_n: Array
 
-    def beside(self, model: LinearModel) -> LinearModel:
+    def added_to(self, model: LinearModel) -> LinearModel:
         """Return the model with `THRUST` as its last input."""
         return replace(
             model,

@@ -33,7 +33,7 @@ class ModelError:
     shift : Array, shape (k,)
         By how much each estimate may be off, one deviation.
     variance : Array, shape (k,)
-        What each has beside that of noise.
+        What each adds to that of noise.
     freedom : Array, shape (k,)
         Most degrees of freedom; infinite where the test says nothing.
     warnings : tuple of str
@@ -49,7 +49,7 @@ class ModelError:
 
 @dataclass(frozen=True, slots=True)
 class Uncertainty:
-    """Covariance of an estimate, and what its intervals and its reader need beside it.
+    """Covariance of an estimate, and what its intervals and its reader need with it.
 
     Attributes
     ----------

@@ -24,7 +24,7 @@ from host.sysid.numerics.response import Response
 OTHER_HOLD = {"foh": "zoh", "zoh": "foh"}
 MOST_JUMPS = 20  # of all records: those that may move the mean of an input most
 WHOLE = 1.1  # times what is possible: the answer is linear about a hold that is not the right one
-# Of the power of a residual: less beside what inputs may have done is no noise of a sensor.
+# Of the power of a residual: less after what inputs may have done is no noise of a sensor.
 EXPLAINED_BUT = 0.05
 # Of a residual's deviation: the other hold moves outputs by less where inputs explain little of it.
 SMALL = 0.2
@@ -36,7 +36,7 @@ STRAIGHT = 1e-6  # of an input's range: what jumps by less does not
 class Jump:
     """An interval in which an input may have jumped, from this sample of a maneuver to the next.
 
-    `most` is by how much its mean over the interval may be beside that of the line.
+    `most` is by how much its mean over the interval may be off that of the line.
     """
 
     maneuver: int

@@ -4,7 +4,7 @@ The filter is an extended Kalman filter whose gain follows the motion; nothing i
 mean. Its likelihood is exact for that filter (Jategaonkar, Flight Vehicle System Identification,
 2nd ed., ch. 5). Slopes of states and outputs within it are exact, those of its likelihood by the
 unknowns are one-sided differences over so little of a bound that no bend of the innovations counts:
-over a hundredth, six degrees of freedom in gusts stood still half a bound beside their optimum.
+over a hundredth, six degrees of freedom in gusts stop half a bound from their optimum.
 """
 
 from __future__ import annotations

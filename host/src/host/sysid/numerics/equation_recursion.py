@@ -18,7 +18,7 @@ from host.sysid.expressions.equation_code import of_equations
 from host.sysid.numerics.recursion import STATE_LIMIT
 
 SHORTEST = 1e-9  # of a sample: no step is
-BESIDE = 1e-6  # of a sample: before and behind a jump
+JUMP_OFFSET = 1e-6  # of a sample: before and behind a jump
 # Of each stage: weight, how late its inputs are, how far ahead of the begin the next stage is.
 STAGES = ((1.0, 0.0, 0.5), (2.0, 0.5, 0.5), (2.0, 0.5, 1.0), (1.0, 1.0, 0.5))
 
@@ -152,8 +152,8 @@ def add_jumps(
     A jump that comes later leaves the rates before it for so long. `work` (2, n) and `u` (2, m) are
     work.
     """
-    take_held(held, position - BESIDE, shift, u[0])
-    take_held(held, position + BESIDE, shift, u[1])
+    take_held(held, position - JUMP_OFFSET, shift, u[0])
+    take_held(held, position + JUMP_OFFSET, shift, u[1])
     for j in range(len(shift)):
         if input_column[j] < 0 or u[0, j] == u[1, j]:
             continue
@@ -260,7 +260,7 @@ def run_equations(
     u, slope = np.zeros(m), np.zeros(m)
     fx, fu, fp = np.zeros((n, n)), np.zeros((n, m)), np.zeros((n, q))
     yx, yu, yp = np.zeros((outputs, n)), np.zeros((outputs, m)), np.zeros((outputs, q))
-    work, beside = np.zeros((2, n)), np.zeros((2, m))
+    work, after = np.zeros((2, n)), np.zeros((2, m))
     for k in range(len(inputs)):
         for i in range(n):
             if not abs(state[i, 0]) < STATE_LIMIT:
@@ -299,7 +299,7 @@ def run_equations(
             add_times(h / 6.0, total, state)
             add_times(h / 6.0, total_S, S)
             if ramp == 0.0 and L > 0:
-                add_jumps(state[:, 0], k + end, held, shift, input_column, p, c, t, S, work, beside)
+                add_jumps(state[:, 0], k + end, held, shift, input_column, p, c, t, S, work, after)
             whole += 1 if end == (whole + 1.0) / substeps else 0
             position = end
     return True

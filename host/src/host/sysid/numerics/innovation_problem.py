@@ -81,7 +81,7 @@ class InnovationLikelihood:
 
 @dataclass(frozen=True, slots=True)
 class InnovationSlopes:
-    """Slopes of one maneuver's innovations, and what their covariance tells beside them.
+    """Slopes of one maneuver's innovations, and what their covariance says as well.
 
     Attributes
     ----------

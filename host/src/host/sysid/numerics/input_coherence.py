@@ -10,8 +10,8 @@ moves: thrust and bank, measured columns of a user's equations, follow the gusts
 A second test asks for the signatures of usual errors (`model_error_signatures`), each with its own
 shape in all outputs at once, so that a small error is seen; the level of 1 % is shared by halves.
 
-The noise model is estimated beside those columns (restricted likelihood): what inputs drive is
-then not taken for noise.
+The noise model is estimated together with those columns (restricted likelihood): what inputs
+drive is then not taken for noise.
 
 What sensors may have wrong by their file is in the intervals by itself, and no lack of the model:
 each error takes of the residual what its deviation allows. In calm air a right pitot 1 % off was
@@ -49,9 +49,9 @@ from host.sysid.numerics.response import Response
 from host.sysid.numerics.signature_test import SignatureTest, WhitenedOutput, signature_test
 
 SUSPICION = 0.10  # from here on intervals count that it may
-ROUNDS_WITHOUT, ROUNDS_BESIDE = 2, 3  # of the noise models: first without the added columns
-# Means over this long are tested: of quicker samples an AR model of low order cannot tell slow
-# gusts beside a sensor's white noise.
+ROUNDS_WITHOUT, ROUNDS_WITH = 2, 3  # of the noise models: first without the added columns
+# Means over this long are tested: of quicker samples an AR model of low order cannot separate slow
+# gusts from a sensor's white noise.
 BLOCK_S = 0.05
 SHOWS = 0.1  # of the power of noise: a known error with less takes nothing of the residual
 
@@ -70,7 +70,7 @@ class InputCoherence:
     columns : Array, shape (p,)
         Degrees of freedom of the numerator.
     noise : tuple of ArNoise
-        Of each output, beside what the inputs drive.
+        Of each output, without what the inputs drive.
     innovation_variance : Array, shape (p,)
     signature : SignatureTest
         Of usual errors of a model.
@@ -138,7 +138,7 @@ class InputCoherence:
         return covariance_from_information(total)
 
     def widened_covariance(self) -> Array:
-        """Return the covariance if the model lacks along its parameters what it lacks beside them.
+        """Return the covariance if the model lacks along its parameters what it lacks outside them.
 
         The power of a coherent residual over that of noise is `ratio` along the columns that the
         parameters cannot take. Along those that they took it cannot be seen, and is held to be the
@@ -154,7 +154,7 @@ def input_coherence(
     responses: Sequence[Response],
     theta: Array,
     *,
-    beside: Sequence[Array] = (),
+    nuisance: Sequence[Array] = (),
     highest_order: int = HIGHEST_ORDER,
     block_s: float = BLOCK_S,
 ) -> InputCoherence:
@@ -168,7 +168,7 @@ def input_coherence(
         Of the model at the estimate, one of each maneuver.
     theta : Array, shape (P,)
         The estimate, constants of the maneuvers included.
-    beside : sequence of Array, shape (p, samples, k)
+    nuisance : sequence of Array, shape (p, samples, k)
         Of each maneuver, the change of the residual by one deviation of each of k errors that are
         counted elsewhere; none without.
     highest_order : int
@@ -177,7 +177,7 @@ def input_coherence(
         Residuals are taken in means over this long; 0 keeps the samples, and the noise models are
         then those of samples.
     """
-    data = _data(problem, responses, block_s, beside)
+    data = _data(problem, responses, block_s, nuisance)
     count = len(problem.names)
     data = _with_what_shows(data, count, problem.least_variance)
     own_prior, known = problem.prior_precision, data[0].slopes[0].shape[1] - count
@@ -187,13 +187,13 @@ def input_coherence(
     variance = np.array([np.mean(np.concatenate(d.residuals) ** 2) for d in data])
     variance = np.maximum(variance, problem.least_variance)
     whitened = [whiten(d, n) for d, n in zip(data, noise, strict=True)]
-    for number in range(ROUNDS_WITHOUT + ROUNDS_BESIDE):
+    for number in range(ROUNDS_WITHOUT + ROUNDS_WITH):
         total = np.diag(prior) + sum(
             gram(w.slopes) / v for w, v in zip(whitened, variance, strict=True)
         )
         fitted = FittedParameters.of(total, pulled + total_score(whitened, variance))
         updated = [
-            noise_model(d, w, v, fitted, highest_order, beside=number >= ROUNDS_WITHOUT)
+            noise_model(d, w, v, fitted, highest_order, with_added=number >= ROUNDS_WITHOUT)
             for d, w, v in zip(data, whitened, variance, strict=True)
         ]
         noise = [n for n, _ in updated]
@@ -251,7 +251,7 @@ def _data(
     problem: OutputProblem,
     responses: Sequence[Response],
     block_s: float,
-    beside: Sequence[Array],
+    nuisance: Sequence[Array],
 ) -> list[OutputData]:
     model, size = problem.model, len(problem.names)
     shortest_s = min(m.samples * m.dt_s for m in problem.maneuvers)
@@ -270,7 +270,7 @@ def _data(
             own = block_means(response.sensitivities[j], block, seen)
             whole = np.zeros((len(own), size))
             whole[:, problem.columns(number)] = own
-            known = [block_means(beside[number][j], block, seen)] if len(beside) else []
+            known = [block_means(nuisance[number][j], block, seen)] if len(nuisance) else []
             slopes.append(np.hstack([whole, *known]))
             left = problem.residual(number, response.y)[j]
             residuals.append(block_means(left[:, None], block, seen)[:, 0])

@@ -1,4 +1,4 @@
-"""What added columns explain of an output beside the parameters, in noise of any colour."""
+"""What added columns explain of an output besides the parameters, in noise of any colour."""
 
 from __future__ import annotations
 
@@ -147,17 +147,17 @@ def noise_model(
     fitted: FittedParameters,
     highest: int,
     *,
-    beside: bool,
+    with_added: bool,
 ) -> tuple[ArNoise, float]:
     """Return the AR model of an output's noise and its innovation variance.
 
-    `beside` says whether the added columns take their share first.
+    `with_added` says whether the added columns take their share first.
     """
     own = fitted.inverse @ fitted.score
     added: Array = np.zeros(data.added[0].shape[1])
     root: Array = np.zeros((len(added), 0))
     link: Array = np.zeros((len(own), len(added)))
-    if beside:
+    if with_added:
         inner, right, link = reduced_normal(w, variance, fitted)
         scale, kept, directions = _scaled_eigen(inner, w, variance)
         root = (directions / np.sqrt(kept)) / scale[:, None]  # of the added columns' covariance

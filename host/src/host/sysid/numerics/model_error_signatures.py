@@ -53,8 +53,8 @@ def model_error_signatures(
     u = maneuver.inputs - maneuver.inputs[0]
     moving = {s: y[:, model.outputs.index(s)] for s in model.states if s in model.outputs}
     free_rows = sorted({t.row for t in model.terms if t.matrix in "AB"})
-    # What a parameter of the model does is no error beside it: q in the equation of q is M_q but
-    # for rounding, and that rounding passed for a bias of M_q by 50 %.
+    # What a parameter of the model does is no error of it: q in the equation of q is M_q but
+    # for rounding, and that rounding passes for a bias of M_q by 50 %.
     own = {
         (t.row, (model.states if t.matrix == "A" else model.inputs)[t.column])
         for t in model.terms

@@ -18,7 +18,7 @@ from host.sysid.numerics.discretisation import powers_of
 
 STATE_LIMIT = 1e8  # a response beyond it has diverged
 WORTH_COMPILING = 1.5e7  # 0.1 s of numpy ten times a search, in values of states and slopes
-OVERHEAD = 100  # the same, what a sample costs beside them
+OVERHEAD = 100  # the same, what a sample costs besides them
 BLOCK = 256  # samples: the input of 96 sensitivities over one block is 200 kB
 
 

@@ -49,7 +49,7 @@ def shared_noise_covariance(
 def _lagged(
     first: Sequence[Array], second: Sequence[Array], lag: int
 ) -> Iterator[tuple[Array, Array]]:
-    """Yield rows of the first beside rows of the second that are `lag` later."""
+    """Yield rows of the first with rows of the second that are `lag` later."""
     for a, b in zip(first, second, strict=True):
         n = len(a) - abs(lag)
         if n > 0:

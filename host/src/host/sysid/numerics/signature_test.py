@@ -69,7 +69,7 @@ def signature_test(
     inverse: Array,
     score: Array,
 ) -> SignatureTest:
-    """Return the signature that explains most of the residual beside the parameters.
+    """Return the signature that explains most of the residual besides the parameters.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class FlightAtHand:
-    """One flight as arrays, and what is known beside them.
+    """One flight as arrays, and what is known besides them.
 
     Attributes
     ----------

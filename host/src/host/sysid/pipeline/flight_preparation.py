@@ -136,7 +136,7 @@ def _reconstructed(
 ) -> ReconstructedFlight:
     """Correct the columns by the aircraft file and what the sensors say, else by calibration."""
     read, known = given.read, given.known
-    told = agreed.found if given.how.corrections else None
+    corrections = agreed.found if given.how.corrections else None
     unplaced = agreed.sensors.recorded(read.recording)
     return reconstruct_flight(
         columns,
@@ -144,8 +144,8 @@ def _reconstructed(
         source=given.source,
         airframe=known.airframe if known else None,
         # Without sensor positions a vane ahead of the CG looks like a delayed one.
-        compatibility=told if known else None,
-        by_default=None if known else by_calibration_alone(unplaced, told),
+        compatibility=corrections if known else None,
+        by_default=None if known else by_calibration_alone(unplaced, corrections),
         instrument=agreed.sensors if known else None,
         resolution=read.resolution,
         maker=read.recording.maker,

@@ -161,7 +161,7 @@ class Identification:
 
     @cached_property
     def opinions(self) -> tuple[tuple[Opinion, ...], ...]:
-        """What autotunes in the logs say beside each linear answer."""
+        """What autotunes in the logs say of each linear answer's response."""
         if not any(flight.tuned for flight in self.flights):
             return ()
         from host.sysid.answer.autotune_opinion import opinions

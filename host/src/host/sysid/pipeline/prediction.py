@@ -175,7 +175,7 @@ class _Saved:
     late_s : dict
         By how much each input is late.
     thrust : ThrustColumn or None
-        What measured thrust does beside the model.
+        What measured thrust adds to the model.
     """
 
     path: Path
@@ -193,13 +193,13 @@ class _Saved:
     def driven(
         self, flight: ReconstructedFlight
     ) -> tuple[list[tuple[str, LinearModel]], tuple[str, ...]]:
-        """Return the models with the thrust of a flight beside them where it has one, and notes."""
+        """Return the models with the thrust of a flight added where it has one, and notes."""
         notes = tuple(self.doubts)
         if self.thrust is None:
             return self.models, notes
         if THRUST not in flight.corrected:
             return self.models, (*notes, THRUST_HELD)
-        return [(label, self.thrust.beside(m)) for label, m in self.models], notes
+        return [(label, self.thrust.added_to(m)) for label, m in self.models], notes
 
 
 def _read_saved(path: Path) -> _Saved:
@@ -243,7 +243,7 @@ def _without_start(document: Mapping[str, object], model: LinearModel) -> list[s
 
 
 def _thrust(path: Path, models: Sequence[tuple[str, LinearModel]]) -> ThrustColumn | None:
-    """Return what measured thrust does beside a saved linear model; None where nothing is known."""
+    """Return what measured thrust adds to a saved linear model; None where nothing is known."""
     if read_document(path).get("kind") is not None:
         return None
     [(_, model)] = models

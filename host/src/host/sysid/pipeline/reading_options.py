@@ -33,7 +33,7 @@ class ReadingOptions:
     delays : bool
         Estimate residual delays, and places of sensors that no aircraft file gives.
     also : tuple of str
-        Signals to read beside those that are always read.
+        Signals to read besides those that are always read.
     equations : tuple of str
         Columns that a model reads: others cut and change nothing. Empty: it may be any.
     accept : frozenset of str
@@ -82,7 +82,7 @@ def reading_options(
     ends : tuple
         From and to of one stretch of every flight, s.
     also : tuple of str
-        Signals to read beside those that are always read.
+        Signals to read besides those that are always read.
     equations : tuple of str
         As `ReadingOptions` has them.
 

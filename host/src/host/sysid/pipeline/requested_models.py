@@ -28,8 +28,8 @@ DEFAULT_MODELS = ("longitudinal", "lateral")
 # The replacement of a default model, and why.
 WITHOUT_AIRSPEED = (
     {"longitudinal": "short-period", "lateral": "dutch-roll"},
-    "without airspeed_mps longitudinal and lateral cannot be told: short-period and dutch-roll by"
-    " angles and rates in their place; name its column in a map (argument mapping) if there is one",
+    "without airspeed_mps longitudinal and lateral cannot be estimated: short-period and dutch-roll"
+    " by angles and rates replace them; name its column in a map (argument mapping) if it is there",
 )
 WITHOUT_VANES = (
     {"longitudinal": "short-period"},
@@ -38,11 +38,11 @@ WITHOUT_VANES = (
 )
 WITHOUT_PITCH = (
     {"longitudinal": "short-period"},
-    "without theta_rad longitudinal cannot be told: short-period in its place",
+    "without theta_rad longitudinal cannot be estimated: short-period in its place",
 )
 WITHOUT_BANK = (
     {"lateral": "dutch-roll"},
-    "without phi_rad lateral cannot be told: dutch-roll in its place",
+    "without phi_rad lateral cannot be estimated: dutch-roll in its place",
 )
 
 

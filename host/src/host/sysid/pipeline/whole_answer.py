@@ -1,4 +1,4 @@
-"""All that an answer holds, as text and as a document: every number, truth and prior beside it."""
+"""All that an answer holds, as text and as a document: every number, with truth and prior."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def number_lines(found: Identification, width: int) -> list[str]:
 
 
 def compared_lines(found: Identification) -> list[str]:
-    """Return the answer beside the prior and the truth that were given."""
+    """Return the answer with the prior and the truth that were given."""
     lines: list[str] = []
     if found.prior is not None:
         lines += ["", *prior_lines(found.coefficient_tables, found.prior)]

@@ -34,7 +34,7 @@ GUST_S = 1.5  # how long a gust lasts; 25 m at 17 m/s
 GPS_SD_MPS, AIRSPEED_SD_MPS, AIRSPEED_S = 0.15, 0.3, 0.2
 GYRO_SD, FORCE_SD = 0.003, 0.10  # per root Hz: noise, scale and vibration of an autopilot's IMU
 TURN_SD_RAD = np.radians([3.0, 3.0, 10.0])  # of the autopilot's attitude at the first instant
-ACROSS_SD_MPS2 = (0.3, 0.15)  # of a_z and a_y beside their model
+ACROSS_SD_MPS2 = (0.3, 0.15)  # of a_z and a_y about their model
 # What is known of the coefficients before, mean and standard deviation: of a_z over the handbook's
 # lift slope (constant, slope, pitch rate, elevator), of a_y as CY (slope, roll and yaw rate,
 # rudder, aileron).

@@ -153,7 +153,7 @@ def _sensors_at_cg(
 ) -> tuple[dict[str, Array], float]:
     """Return what is used of a record, friction, filters and places of sensors taken out; its step.
 
-    The airspeed behind local polynomials stands beside.
+    The airspeed behind local polynomials is kept as well.
     """
     wanted = {*IMU, *outputs, "t_s", "phi_rad", "theta_rad", "psi_rad", "density_kgpm3"}
     data = {k: v for k, v in columns.items() if k in wanted}

@@ -206,7 +206,7 @@ def _estimate(
     if not gps:
         deviation = min(NO_GPS_INFLATION * deviation, sd)
         if name == FLOW[1] and deviation < sd:
-            value, deviation = _beside_imu((value, deviation), sd, priors)
+            value, deviation = _with_imu_errors((value, deviation), sd, priors)
     data_informed = deviation < POSTERIOR_PRIOR_RATIO * sd
     reason = "" if data_informed else _reason(name, gps=gps)
     if name in FLOW and name not in found:
@@ -228,7 +228,7 @@ def _estimate(
 
 
 def by_calibration_alone(
-    instrument: SensorErrorModel, told: Compatibility | None = None
+    instrument: SensorErrorModel, found: Compatibility | None = None
 ) -> Compatibility:
     """Return a check in which each error is as open as its calibration leaves it.
 
@@ -237,10 +237,10 @@ def by_calibration_alone(
     Parameters
     ----------
     instrument : SensorErrorModel
-    told : Compatibility, optional
+    found : Compatibility, optional
         Of sensors at unknown places: the zeros of its gyros need none, and stand.
     """
-    known = {f.name: f for f in told.findings if f.data_informed} if told is not None else {}
+    known = {f.name: f for f in found.findings if f.data_informed} if found is not None else {}
     findings = (
         known[name]
         if name in known and name in GYRO_ZEROS
@@ -260,7 +260,7 @@ def _tests_without_gps(
 ) -> tuple[ConsistencyTest, ...]:
     """Return the tests of the file by what is estimated without GPS.
 
-    The zero of the alpha vane is one beside the IMU's, and what comes out as a gyro's bias is off
+    The zero of the alpha vane comes with the IMU's, and what comes out as a gyro's bias is off
     by as much again as the file says (in calm air 2.1 mrad/s about q of 2.0, known to 0.1): as they
     came out of the fit 7 of 40 right files were doubted.
     """
@@ -270,17 +270,17 @@ def _tests_without_gps(
         before = float(np.sqrt(covariance[k, k]))
         after = sd
         if before < sd:
-            found[k], after = _beside_imu((float(found[k]), before), sd, priors)
+            found[k], after = _with_imu_errors((float(found[k]), before), sd, priors)
         covariance[k] *= after / before
         covariance[:, k] *= after / before
     found[[name in UNOBSERVABLE_WITHOUT_GPS for name in names]] /= np.sqrt(2.0)
     return consistency_tests(names, found, covariance, priors)
 
 
-def _beside_imu(
+def _with_imu_errors(
     estimate: tuple[float, float], sd: float, priors: Mapping[str, tuple[float, float]]
 ) -> tuple[float, float]:
-    """Return the zero of the alpha vane and its deviation beside errors of the IMU, rad.
+    """Return the zero of the alpha vane and its deviation with errors of the IMU, rad.
 
     Without GPS they are no unknowns: the zero takes the tilt and the bias along x, which look like
     it. 0.003 rad of either moved it by as much, known to 0.0009, and Cn_r by 0.5 %.

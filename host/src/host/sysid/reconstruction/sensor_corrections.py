@@ -69,7 +69,7 @@ def residual_deviations(found: Compatibility) -> dict[str, float]:
         if f.name in CORRECTABLE
     }
     if PITOT[0] in remaining:
-        remaining[DENSITY] = _density_beside_airspeed(found)
+        remaining[DENSITY] = _density_given_airspeed(found)
     return remaining
 
 
@@ -82,13 +82,13 @@ def pressure_share(found: Compatibility) -> float:
     return max(1.0 - (density / max(total, density)) ** 2, LEAST_PRESSURE_SHARE)
 
 
-def _density_beside_airspeed(found: Compatibility) -> float:
+def _density_given_airspeed(found: Compatibility) -> float:
     """Return the standard deviation of density once V squared is known.
 
     Scales of pitot and density make V squared together. What they leave it to be is one error,
     `pitot_scale`, of which dynamic pressure has `pressure_share`. How it divides between the two
-    is another, independent of it. Without that dynamic pressure counted as known to 1.8 % where
-    the pitot's scale was known to 2.
+    is another, independent of it. Without that dynamic pressure counts as known to 1.8 % where
+    the pitot's scale is known to 2.
     """
     return float(np.sqrt(pressure_share(found))) * density_share(found.instrument)
 
@@ -102,8 +102,8 @@ def pressure_scale(found: Compatibility) -> tuple[float, float] | None:
     scale = next((f for f in found.findings if f.name == "pitot_scale" and f.data_informed), None)
     if scale is None:
         return None
-    part, beside = pressure_share(found), NORMAL_95 * _density_beside_airspeed(found)
-    return part * scale.value, float(np.hypot(part * scale.half_width, beside))
+    part, density = pressure_share(found), NORMAL_95 * _density_given_airspeed(found)
+    return part * scale.value, float(np.hypot(part * scale.half_width, density))
 
 
 def correct_columns(
