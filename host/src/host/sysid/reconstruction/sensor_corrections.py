@@ -20,6 +20,7 @@ from host.sysid.reconstruction.reconstruction import Compatibility
 
 RATES = tuple(f"{a}_radps" for a in "pqr")
 FORCES = tuple(f"a{a}_mps2" for a in "xyz")
+ATTITUDE = ("phi_rad", "theta_rad")
 # An error of density and dynamic pressure that leaves V squared as it is: nothing observes it.
 DENSITY = "density_share"
 INSTANTANEOUS_ERRORS = (*INERTIAL, *FLOW, *PITOT, DENSITY)  # without delays
@@ -112,7 +113,7 @@ def correct_columns(
     """Return columns corrected for errors of scale, zero, bias and misalignment.
 
     A sensor reads s = (1 + scale) x + bias in the IMU's own, misaligned axes; the pitot likewise
-    for V squared (EQUATIONS.md, eq. 12).
+    for V squared (EQUATIONS.md, eq. 12). Attitude is that of the IMU, and turns with it.
 
     Parameters
     ----------
@@ -145,7 +146,22 @@ def correct_columns(
         zero, scale = at(f"{name}_zero_rad", 0.0), at(f"{name}_scale", 0.0)
         if f"{name}_rad" in columns and (zero or scale):
             result[f"{name}_rad"] = (columns[f"{name}_rad"] - zero) / (1.0 + scale)
-    return result | _correct_pitot(columns, errors, part)
+    return result | _level_attitude(columns, tilt) | _correct_pitot(columns, errors, part)
+
+
+def _level_attitude(columns: Mapping[str, Array], tilt: Array) -> dict[str, Array]:
+    """Return the attitude of the aircraft in place of that of an IMU with a small tilt in it.
+
+    Where no vane measured it, the angle of attack of the trim is pitch over path: with a tilt left
+    in it, rates about other axes than those of the angle pass for a false N_p.
+    """
+    if not (tilt.any() and all(name in columns for name in ATTITUDE)):
+        return {}
+    phi, theta = (columns[name] for name in ATTITUDE)
+    about_y = tilt[1] * np.cos(phi) - tilt[2] * np.sin(phi)
+    about_z = tilt[1] * np.sin(phi) + tilt[2] * np.cos(phi)
+    level = (phi - tilt[0] - about_z * np.tan(theta), theta - about_y)
+    return dict(zip(ATTITUDE, level, strict=True))
 
 
 def _correct_pitot(
