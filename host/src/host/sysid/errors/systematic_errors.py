@@ -292,6 +292,7 @@ def _bent(trim: Trim, still: Trim, there: Trim) -> Trim:
         trim,
         airspeed_mps=trim.airspeed_mps + there.airspeed_mps - still.airspeed_mps,
         alpha_rad=trim.alpha_rad + there.alpha_rad - still.alpha_rad,
+        theta_rad=trim.theta_rad + there.theta_rad - still.theta_rad,
     )
 
 
