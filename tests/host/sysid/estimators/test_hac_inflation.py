@@ -1,7 +1,7 @@
 """Intervals widened by what neighbouring scores have in common."""
 
 import numpy as np
-from host.sysid.estimators.hac_inflation import hac_inflation, inflation_lines
+from host.sysid.estimators.innovations import hac_inflation, inflation_lines
 from scipy import signal
 from studies.gusts import fly, gusty_aircraft
 from studies.turbulence import fit_both, linear_setup

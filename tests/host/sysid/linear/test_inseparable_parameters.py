@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from host.sysid.models.covariance_root import covariance_root
+from host.sysid.models.uncertainty import covariance_root
 from scipy import signal
 
 import host

@@ -8,8 +8,13 @@ import pytest
 from host.sysid.estimators import fit
 from host.sysid.models import LinearModel, Maneuver, equations_from
 from host.sysid.numerics import OutputProblem, autocovariance, minimise, output_problem
-from host.sysid.numerics.input_coherence import InputCoherence, block_means, input_coherence
-from host.sysid.numerics.input_regressors import input_regressors, lag_knots_s
+from host.sysid.numerics.input_coherence import (
+    InputCoherence,
+    block_means,
+    input_coherence,
+    input_regressors,
+    lag_knots_s,
+)
 from scipy import signal
 from studies.coverage import coloured_noise
 from studies.inputs import multistep_3211

@@ -11,7 +11,7 @@ from host.constants import GRAVITY_MPS2, NORMAL_95
 from host.errors import IdentificationError
 from host.instrument.deviations import sensor_error_model
 from host.sysid.numerics.ar_noise import ArNoise
-from host.sysid.numerics.response import Response
+from host.sysid.numerics.simulator import Response
 from host.sysid.reconstruction import path_fit
 from host.sysid.reconstruction.flight_path import (
     AIR,

@@ -20,9 +20,9 @@ from host.instrument.error_list import QBAR, conversion_cause
 from host.instrument.instrument_errors import InstrumentErrors, standard_errors
 from host.sysid.aerodynamics.coefficient import Coefficient
 from host.sysid.aerodynamics.path_thrust import PathThrust
-from host.sysid.models.consider_covariance import consider_covariance, dominant_error_source
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.templates import Trim
+from host.sysid.models.uncertainty import consider_covariance, dominant_error_source
 
 
 @dataclass(frozen=True, slots=True)

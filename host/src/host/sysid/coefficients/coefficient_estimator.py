@@ -45,8 +45,8 @@ from host.sysid.flight.reconstructed_flight import (
 )
 from host.sysid.maneuvers.maneuver_detection import FLYING_SHARE, TRIM_AFTER_GAP_S, DetectedManeuver
 from host.sysid.models.coefficient_model import BODY, WIND, CoefficientModel, standard_model
-from host.sysid.models.consider_covariance import dominant_error_source
 from host.sysid.models.modal_analysis import Mode
+from host.sysid.models.uncertainty import dominant_error_source
 
 NAME = "coefficients"
 SETTLED_S = 3.0  # after the launch

@@ -40,8 +40,7 @@ from host.sysid.coefficients.trim_derivatives import (
     derivatives_at_trim,
     zero_lift_drag,
 )
-from host.sysid.models.consider_covariance import consider_covariance
-from host.sysid.models.uncertainty import Uncertainty
+from host.sysid.models.uncertainty import Uncertainty, consider_covariance
 from host.sysid.numerics.maneuver_agreement import ManeuverAgreement, scatter_test
 
 # One deviation of the error that instrumental variables leave, as a share of what they moved. A

@@ -15,7 +15,7 @@ import numpy as np
 from host.arrays import Array, BoolArray, IntArray
 from host.errors import IdentificationError
 from host.sysid.coefficients.equation_blocks import NormalEquations
-from host.sysid.models.consider_covariance import consider_covariance
+from host.sysid.models.uncertainty import consider_covariance
 
 # Growth of the variance of a regressor that is constant or equal to others.
 UNDETERMINED = 1e12

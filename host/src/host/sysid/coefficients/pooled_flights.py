@@ -26,8 +26,7 @@ from host.sysid.coefficients.coefficient_fit import (
     ThrustEffect,
 )
 from host.sysid.coefficients.deletion_diagnostics import CrossValidation
-from host.sysid.models.consider_covariance import consider_covariance
-from host.sysid.models.uncertainty import Uncertainty
+from host.sysid.models.uncertainty import Uncertainty, consider_covariance
 from host.sysid.numerics.maneuver_agreement import ManeuverAgreement, scatter_test
 
 LEAST_EIGENVALUE = 1e-12  # of the largest; below it is rounding

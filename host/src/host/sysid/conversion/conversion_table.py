@@ -19,7 +19,7 @@ from host.aircraft.prior.prior_file import read_prior
 from host.constants import NORMAL_95
 from host.errors import IdentificationError
 from host.files.quantities import Quantity
-from host.files.user_text import shown
+from host.files.user_text import read_toml, shown
 from host.instrument.deviations import sensor_error_model
 from host.instrument.error_list import conversion_errors, error_label
 from host.sysid.conversion.derivative_conversion import (
@@ -31,11 +31,10 @@ from host.sysid.conversion.derivative_conversion import (
     to_coefficients,
     to_derivatives,
 )
-from host.sysid.models.consider_covariance import DOMINANT_SHARE
 from host.sysid.models.model_file import read_model, read_trim
 from host.sysid.models.parameter_units import parameter_unit
 from host.sysid.models.templates import Trim, template
-from host.sysid.models.toml_document import read_document
+from host.sysid.models.uncertainty import DOMINANT_SHARE
 
 STANDARD_KGPM3 = 1.225  # of the standard atmosphere at sea level
 OTHER = dict(zip(DERIVATIVES, COEFFICIENTS, strict=True))
@@ -149,7 +148,7 @@ def _dimensional(path: Path, given: Collection[str]) -> bool:
 
 def _from_toml(path: Path) -> tuple[dict[str, tuple[float, float]], Trim | None]:
     """Return values with half-widths, and what they are about; nothing of a table over alpha."""
-    document = read_document(path)
+    document = read_toml(path, IdentificationError)
     if "states" in document:
         model = read_model(path)
         fit = document.get("fit", {})

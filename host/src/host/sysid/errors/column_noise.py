@@ -15,11 +15,11 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.errors.one_step import one_step_of
-from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import has_equations
 from host.sysid.models.templates import Trim
+from host.sysid.models.uncertainty import consider_covariance
 from host.sysid.numerics.white_noise import white_deviation
 
 DRAWS, DRAW_SEED = 40, 3

@@ -21,14 +21,13 @@ from host.instrument.error_sources import ErrorSource, error_sources
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate, trim_of
 from host.sysid.errors.one_step import OneStep, one_step_of
 from host.sysid.estimators.gust_penetration import penetration_of, without_gust_penetration
-from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.rate_forces import by_prior, with_rate_forces
 from host.sysid.models.reduced_model import without_outputs
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import TEMPLATES, Trim, template
-from host.sysid.models.uncertainty import Uncertainty
+from host.sysid.models.uncertainty import Uncertainty, consider_covariance
 from host.sysid.numerics.model_problems import output_problem
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.reconstruction.flight_path import PITOT

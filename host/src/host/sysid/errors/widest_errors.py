@@ -8,9 +8,8 @@ import numpy as np
 
 from host.instrument.error_list import error_label
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
-from host.sysid.models.consider_covariance import dominant_error_source
 from host.sysid.models.fit_result import FitResult
-from host.sysid.models.uncertainty import Uncertainty
+from host.sysid.models.uncertainty import Uncertainty, dominant_error_source
 
 NOISE = "noise and gusts"
 OUTSIDE_MODEL = "maneuvers that differ, motion outside the model"

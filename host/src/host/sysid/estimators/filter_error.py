@@ -8,8 +8,8 @@ import numpy as np
 
 from host.arrays import Array
 from host.errors import IdentificationError
-from host.sysid.estimators.hac_inflation import hac_inflation, inflation_lines
 from host.sysid.estimators.innovation_search import InnovationObjective, first_noise, noise_floor
+from host.sysid.estimators.innovations import hac_inflation, inflation_lines
 from host.sysid.estimators.noise_model_comparison import compare_noise_models
 from host.sysid.estimators.output_error_fit import fit_output_error
 from host.sysid.estimators.start_values import start_values

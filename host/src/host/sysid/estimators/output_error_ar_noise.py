@@ -23,7 +23,7 @@ import numpy as np
 
 from host.arrays import Array, BoolArray
 from host.sysid.estimators.multistart import multistart
-from host.sysid.models.covariance_root import covariance_root
+from host.sysid.models.uncertainty import covariance_root
 from host.sysid.numerics.ar_noise import (
     HIGHEST_ORDER,
     ArNoise,

@@ -32,9 +32,9 @@ from host.sysid.estimators.servo_delay_profile import (
     DelayProfile,
     Fit,
 )
-from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.uncertainty import consider_covariance
 
 DELAY = "servo_delay_s"
 SERVO = (DELAY, "servo_bandwidth_hz", "servo_rate_limit_radps")

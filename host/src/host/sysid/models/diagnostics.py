@@ -10,10 +10,10 @@ from scipy import special
 
 from host.arrays import Array
 from host.constants import ENTANGLED, NORMAL_95, SMALL_SHARE
-from host.sysid.models.covariance_root import covariance_root
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.uncertainty import covariance_root
 
 RELATIVE_BOUND_LIMIT = 1.0  # standard error over the reference value: 100 %
 EVEN_ODDS = 0.5  # probability of a bound above the limit: more likely than not

@@ -48,7 +48,7 @@ import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.files.quantities import Quantity
-from host.files.user_text import parse_toml, read_text, shown
+from host.files.user_text import parse_toml, read_text, read_toml, shown
 from host.sysid.models.coefficient_model import KIND as COEFFICIENTS
 from host.sysid.models.coefficient_model import CoefficientModel, coefficients_from
 from host.sysid.models.equation_file import KIND as EQUATIONS
@@ -76,7 +76,6 @@ from host.sysid.models.state_space_model import (
     Term,
 )
 from host.sysid.models.templates import Trim
-from host.sysid.models.toml_document import read_document
 from host.text import shown as in_a_line
 
 _PIECE = re.compile(
@@ -142,7 +141,7 @@ def read_trim(path: Path) -> Trim:
     IdentificationError
         If the file has none: a model that a user wrote.
     """
-    table = read_document(path).get("trim", {})
+    table = read_toml(path, IdentificationError).get("trim", {})
     if not isinstance(table, dict) or not _TRIM.keys() <= table.keys():
         raise IdentificationError(f"{path}: no [trim] with {', '.join(_TRIM)}")
     return Trim(

@@ -16,8 +16,8 @@ from host.arrays import Array
 from host.errors import IdentificationError
 from host.export.toml import toml_value
 from host.files.quantities import Quantity
+from host.files.user_text import read_toml
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.models.toml_document import read_document
 
 THRUST = "thrust_n"
 THRUST_COLUMNS = (THRUST, "power_w")  # either tells it
@@ -60,7 +60,7 @@ def read_thrust_column(path: Path, model: LinearModel) -> ThrustColumn | None:
     IdentificationError
         If its table is no number for each state and output of the model.
     """
-    table = read_document(path).get(TABLE)
+    table = read_toml(path, IdentificationError).get(TABLE)
     if table is None:
         return None
     if not isinstance(table, Mapping) or set(table) != {RATES, OUTPUTS}:

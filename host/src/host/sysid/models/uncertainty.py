@@ -3,6 +3,10 @@
 Repeated maneuvers that disagree, residuals that the inputs drive and effects of inputs that are
 absent may show one error of a model. Each test speaks of the noise alone (`ModelError`), never of
 what another made of it, so that nothing depends on which is heard first.
+
+An error of mass, of a sensor's place, of a calibration or of a delay is the same in every sample,
+and more data do not average it away. Such an error is a consider parameter: it is not estimated,
+but its standard deviation, from `host.instrument` or the aircraft file, counts in the covariance.
 """
 
 from __future__ import annotations
@@ -13,7 +17,60 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.sysid.models.consider_covariance import consider_covariance
+
+DOMINANT_SHARE = 0.25  # of the variance: an error with less is not named
+
+
+def consider_covariance(shifts: Array) -> Array:
+    """Return the covariance that systematic errors add, sum over errors k of s_k s_k', (P, P).
+
+    EQUATIONS.md, eq. 35.
+
+    Parameters
+    ----------
+    shifts : Array, shape (errors, P)
+        Shift s_k of the estimate for one standard deviation of each error.
+    """
+    return np.asarray(shifts.T @ shifts)
+
+
+def dominant_error_source(parts: dict[str, float], variance: float) -> str:
+    """Return the error that causes most of a variance; empty if none causes a quarter of it.
+
+    Parameters
+    ----------
+    parts : dict
+        Variance that each error causes.
+    variance : float
+        Total, in the same unit.
+    """
+    if not parts:
+        return ""
+    cause = max(parts, key=parts.__getitem__)
+    return cause if parts[cause] >= DOMINANT_SHARE * max(variance, 1e-300) else ""
+
+
+ALIKE = 1e6  # times larger: eigenvectors still have four digits
+
+
+def covariance_root(covariance: Array) -> Array:
+    """Return R with R R' = covariance, (P, P); it may be singular.
+
+    Deviations of unlike size are first scaled to one. With two parameters that nothing
+    separates, with deviations of 1e11, eigenvectors of the bare matrix are rounding for all others:
+    noise that is estimated with them gets 30 times its variance, and intervals four to nine
+    times their width.
+
+    Parameters
+    ----------
+    covariance : Array, shape (P, P)
+    """
+    deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    known = deviation[deviation > 0.0]
+    unlike = len(known) > 0 and float(known.max()) > ALIKE * float(known.min())
+    scale = np.where(unlike & (deviation > 0.0), deviation, 1.0)
+    value, vector = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return np.asarray(scale[:, None] * vector * np.sqrt(np.maximum(value, 0.0)), dtype=np.float64)
 
 
 def _none() -> Array:

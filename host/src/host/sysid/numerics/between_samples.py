@@ -19,7 +19,7 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.model_problems import output_problem
 from host.sysid.numerics.output_error_problem import OutputProblem
-from host.sysid.numerics.response import Response
+from host.sysid.numerics.simulator import Response
 
 OTHER_HOLD = {"foh": "zoh", "zoh": "foh"}
 MOST_JUMPS = 20  # of all records: those that may move the mean of an input most

@@ -6,6 +6,8 @@ the noise and freed of what the model's own parameters could still take (a Lagra
 Engle, Handbook of Econometrics II, 1984, ch. 13). All lags are tested as one, so their number is
 counted by the degrees of freedom; the number of outputs by Sidak's level. Inputs are what a pilot
 moves: thrust and bank, measured columns of a user's equations, follow the gusts that outputs feel.
+Lags are taken by hat functions whose knots double, so that a few columns reach from one sample to
+seconds.
 
 A second test asks for the signatures of usual errors (`model_error_signatures`), each with its own
 shape in all outputs at once, so that a small error is seen; the level of 1 % is shared by halves.
@@ -29,9 +31,7 @@ from scipy import special
 from host.arrays import Array, BoolArray
 from host.constants import SIGNIFICANCE
 from host.sysid.numerics.ar_noise import HIGHEST_ORDER, ArNoise
-from host.sysid.numerics.information_inverse import (
-    covariance_from_information,
-)
+from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.input_drive import (
     FittedParameters,
     OutputData,
@@ -42,11 +42,10 @@ from host.sysid.numerics.input_drive import (
     total_score,
     whiten,
 )
-from host.sysid.numerics.input_regressors import input_regressors, lag_knots_s
 from host.sysid.numerics.model_error_signatures import model_error_signatures
 from host.sysid.numerics.output_error_problem import OutputProblem
-from host.sysid.numerics.response import Response
 from host.sysid.numerics.signature_test import SignatureTest, WhitenedOutput, signature_test
+from host.sysid.numerics.simulator import Response
 
 SUSPICION = 0.10  # from here on intervals count that it may
 ROUNDS_WITHOUT, ROUNDS_WITH = 2, 3  # of the noise models: first without the added columns
@@ -307,3 +306,49 @@ def block_means(values: Array, block: int, seen: BoolArray | None = None) -> Arr
         return np.asarray(blocks.mean(axis=1))
     weight = seen[: count * block].reshape(count, block, -1)
     return np.asarray((blocks * weight).sum(axis=1) / np.maximum(weight.sum(axis=1), 1))
+
+
+FIRST_KNOT_S, LONGEST_S = 0.05, 3.2
+LAG_SHARE = 0.25  # of the shortest record: a longer memory is not seen often enough
+
+
+def lag_knots_s(dt_s: float, shortest_s: float) -> Array:
+    """Return the knots of the lags, s: 0, then doubling.
+
+    Parameters
+    ----------
+    dt_s : float
+        Sample period; no knot is nearer to zero.
+    shortest_s : float
+        Of the records.
+    """
+    longest_s = min(LONGEST_S, LAG_SHARE * shortest_s)
+    knots = [0.0, max(FIRST_KNOT_S, dt_s)]
+    while 2.0 * knots[-1] <= longest_s:
+        knots.append(2.0 * knots[-1])
+    return np.array(knots)
+
+
+def input_regressors(inputs: Array, modelled: Array, dt_s: float, knots_s: Array) -> Array:
+    """Return columns that the inputs drive, (samples, inputs x knots + 3 x modelled).
+
+    Parameters
+    ----------
+    inputs : Array, shape (samples, m)
+        Before the record they stood where they begin.
+    modelled : Array, shape (samples, k)
+        Simulated outputs: an error of a slow mode lasts longer than any lag. Their squares, with
+        and without sign, stand for what is not linear.
+    dt_s : float
+    knots_s : Array
+        Of `lag_knots_s`.
+    """
+    samples = len(inputs)
+    lag_s = np.arange(int(np.ceil(knots_s[-1] / dt_s)) + 1) * dt_s
+    hats = np.array([np.interp(lag_s, knots_s, row) for row in np.eye(len(knots_s))])
+    hats[:, lag_s > knots_s[-1] + 1e-9] = 0.0
+    columns = []
+    for u in (inputs - inputs[0]).T:
+        columns += [np.convolve(u, hat)[:samples] for hat in hats]
+    y = modelled - modelled[0]
+    return np.column_stack([*columns, y, y * y, y * np.abs(y)])

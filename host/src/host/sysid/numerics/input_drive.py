@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.models.covariance_root import covariance_root
+from host.sysid.models.uncertainty import covariance_root
 from host.sysid.numerics.ar_noise import ArNoise, choose_order, fit_ar, lagged_moments
 from host.sysid.numerics.information_inverse import (
     identified_inverse,

@@ -14,7 +14,7 @@ from scipy import linalg
 
 from host.arrays import Array
 from host.sysid.numerics.output_error_problem import OutputProblem
-from host.sysid.numerics.response import Response
+from host.sysid.numerics.simulator import Response
 
 
 @dataclass(frozen=True, slots=True)

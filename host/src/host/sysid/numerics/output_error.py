@@ -18,7 +18,7 @@ from host.sysid.numerics.gauss_newton import (
     gauss_newton,
 )
 from host.sysid.numerics.output_error_problem import OutputProblem
-from host.sysid.numerics.response import Response
+from host.sysid.numerics.simulator import Response
 
 MAX_ITERATIONS = 60
 MOST_NAMED = 5

@@ -12,9 +12,13 @@ from host.errors import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.fractional_delay import delay_columns, slope_by_delay
-from host.sysid.numerics.response import Response
 from host.sysid.numerics.sampled_model import SampledModel, Sampler
-from host.sysid.numerics.simulator import EquationMotion, MatrixMotion, simulate_with_slopes
+from host.sysid.numerics.simulator import (
+    EquationMotion,
+    MatrixMotion,
+    Response,
+    simulate_with_slopes,
+)
 
 # Of an output's motion: no column is better than this, nor the model of it. Without noise in one
 # column its information drowned that of all others, and 73 to 93 % of the intervals held.

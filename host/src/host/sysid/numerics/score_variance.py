@@ -20,7 +20,7 @@ from host.sysid.numerics.coloured_residuals import (
 from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.input_coherence import block_length, block_means
 from host.sysid.numerics.output_error_problem import OutputProblem
-from host.sysid.numerics.response import Response
+from host.sysid.numerics.simulator import Response
 
 LONGEST_LAG = 200  # of an autocorrelation that counts, means
 # Of a noise's power over that of what is left: more has a record without noise alone.

@@ -22,6 +22,22 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
+class Response:
+    """Simulated outputs of one maneuver and their sensitivities.
+
+    Attributes
+    ----------
+    y : Array, shape (p, samples)
+        Outputs in the units of the model.
+    sensitivities : Array, shape (p, samples, columns of this maneuver)
+        Derivatives of `y` by the unknowns that this maneuver depends on.
+    """
+
+    y: Array
+    sensitivities: Array
+
+
+@dataclass(frozen=True, slots=True)
 class MatrixMotion:
     """A linear model over one sample, and what drives it over a maneuver, (samples, w)."""
 

@@ -12,6 +12,7 @@ import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.export.pictures import Pictures
+from host.files.user_text import read_toml
 from host.sysid.answer.json_document import json_text
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.models.equation_file import KIND as EQUATIONS
@@ -24,7 +25,6 @@ from host.sysid.models.thrust_column import (
     ThrustColumn,
     read_thrust_column,
 )
-from host.sysid.models.toml_document import read_document
 from host.sysid.pipeline.aircraft_motion import aircraft_models
 from host.sysid.pipeline.arguments import (
     path_of,
@@ -213,7 +213,7 @@ def _saved_models(path: Path) -> tuple[list[tuple[str, LinearModel]], list[str]]
     Notes are of parameters that nobody estimated.
     """
     try:
-        kind = read_document(path).get("kind")
+        kind = read_toml(path, IdentificationError).get("kind")
     except IdentificationError as error:
         if path.suffix.lower() == ".toml":
             raise
@@ -228,7 +228,7 @@ def _saved_models(path: Path) -> tuple[list[tuple[str, LinearModel]], list[str]]
             " `host identify --save-model` writes them"
         )
     own = read_model(path)
-    zero = _without_start(read_document(path), own)
+    zero = _without_start(read_toml(path, IdentificationError), own)
     names = ", ".join(zero)
     doubts = [f"held at zero, for {path.name} gives no start of them: {names}"] if zero else []
     return [(own.name, replace(frozen_at(own, own.start), delays=()))], doubts
@@ -244,7 +244,7 @@ def _without_start(document: Mapping[str, object], model: LinearModel) -> list[s
 
 def _thrust(path: Path, models: Sequence[tuple[str, LinearModel]]) -> ThrustColumn | None:
     """Return what measured thrust adds to a saved linear model; None where nothing is known."""
-    if read_document(path).get("kind") is not None:
+    if read_toml(path, IdentificationError).get("kind") is not None:
         return None
     [(_, model)] = models
     return read_thrust_column(path, model)
@@ -252,7 +252,7 @@ def _thrust(path: Path, models: Sequence[tuple[str, LinearModel]]) -> ThrustColu
 
 def _late_inputs(path: Path) -> dict[str, float]:
     """Return by how much each input is late, s, as the fit that a file keeps has found."""
-    document = read_document(path)
+    document = read_toml(path, IdentificationError)
     if document.get("kind") not in (None, EQUATIONS):
         return {}
     own, fitted = read_model(path), document.get("fit", {})

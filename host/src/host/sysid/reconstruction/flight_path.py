@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.sysid.numerics.response import Response
+from host.sysid.numerics.simulator import Response
 from host.sysid.reconstruction.strapdown import (
     cross,
     path_sensitivities,

@@ -22,7 +22,7 @@ import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
 from host.sysid.numerics.ar_noise import ArNoise, fit_ar, lagged_moments
-from host.sysid.numerics.response import Response
+from host.sysid.numerics.simulator import Response
 from host.sysid.reconstruction.flight_path import (
     AIR,
     DELAY_DIFFERENCE,

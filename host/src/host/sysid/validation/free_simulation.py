@@ -18,7 +18,7 @@ from host.sysid.models.state_space_model import LinearModel, has_equations
 from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.model_problems import output_problem
 from host.sysid.numerics.output_error_problem import OutputProblem
-from host.sysid.numerics.response import Response
+from host.sysid.numerics.simulator import Response
 
 CONSTANT_ROUNDS = 6  # steps to the constants of each record, where outputs bend in them
 # With the weights of the first guess alone offsets of 20 m/s2 explain az, and its residual is

@@ -25,8 +25,8 @@ from host.sysid.numerics.input_coherence import (
 )
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.process_noise import air_states, discrete_noise, steady_covariance
-from host.sysid.numerics.response import Response
 from host.sysid.numerics.score_variance import variance_ratio
+from host.sysid.numerics.simulator import Response
 from host.sysid.validation.free_simulation import FreeResponses, weighted_fit
 
 DRAWS, DRAW_SEED = 100, 2

@@ -21,12 +21,11 @@ import numpy as np
 from host.arrays import Array
 from host.sysid.estimators.gust_model import driven_model
 from host.sysid.estimators.innovations import driven_states
-from host.sysid.models.covariance_root import covariance_root
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.models.uncertainty import Uncertainty
+from host.sysid.models.uncertainty import Uncertainty, covariance_root
 from host.sysid.numerics.ar_noise import ArNoise, autocovariance
 from host.sysid.numerics.input_coherence import InputCoherence, block_length, block_means
 from host.sysid.numerics.score_variance import LONGEST_LAG
