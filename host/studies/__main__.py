@@ -224,7 +224,7 @@ def run_alone() -> int:
     command = [sys.executable, "-m", "studies", *sys.argv[1:]]
     try:
         return subprocess.run(command, env={**os.environ, "OPENBLAS_NUM_THREADS": "1"}).returncode
-    except KeyboardInterrupt:  # the child has said what stands
+    except KeyboardInterrupt:  # the child has said what is kept
         return int(ExitCode.INTERRUPTED)
 
 

@@ -2,7 +2,7 @@
 
 Every flight is flown with its own seed, all tolerances drawn, light turbulence; maneuvers as the
 host finds them. The truth is local to the maneuvers. The same flights as the thesis's logger saw
-them (20 rows a second), fitted by its network, stand beside. Seeds below 1000 were looked at while
+them (20 rows a second), fitted by its network, are compared. Seeds below 1000 were looked at while
 the fit was written; the study starts there.
 """
 
@@ -42,7 +42,7 @@ Numbers = list[tuple[float, float]]
 
 @dataclass(slots=True)
 class CoefficientTally:
-    """Coefficients of many flights, modes and delays as error and half-width, the thesis beside."""
+    """Coefficients of many flights, modes and delays as error and half-width; the thesis too."""
 
     coefficients: Tally = field(default_factory=Tally)
     frequency: dict[str, Numbers] = field(default_factory=dict)  # relative
@@ -158,7 +158,7 @@ def direct_answer(columns: Mapping[str, Array]) -> CoefficientAnswer:
     Raises
     ------
     IdentificationError
-        If they cannot be told.
+        If they cannot be estimated.
     """
     found = identify_columns(at_hand(columns, aircraft=AIRCRAFT), models="coefficients")
     assert found.coefficients is not None

@@ -1,6 +1,6 @@
 """Coverage of the default 95 % intervals under four kinds of noise, against the Cramer-Rao width.
 
-NAVION, 3-2-1-1, 20 s, SNR 10. The interval code is not told the noise. Each case also computes,
+NAVION, 3-2-1-1, 20 s, SNR 10. The interval code does not get the noise. Each case also computes,
 run by run, the width of the same model fitted with the true noise covariance.
 """
 

@@ -22,7 +22,7 @@ LARGEST = "largest stable step"  # of the printed one only the table speaks
 
 
 def thesis_figure(runs: Sequence[HopfieldRun], found: Agreement) -> Figure:
-    """Draw the printed figure beside honest ones, and refusal against the analytic bound."""
+    """Draw the printed figure and honest ones, and refusal against the analytic bound."""
     figure = Figure(figsize=(11, 4.6))
     left, right = figure.subplots(1, 2)
     stood = [run for run in runs if not run.diverged and run.what.endswith(LARGEST)]
@@ -86,7 +86,7 @@ def accuracy_figure(cases: Sequence[Accuracy]) -> Figure:
 
 
 def coverage_figure(cases: Sequence[Coverage]) -> Figure:
-    """Draw coverage per parameter and pooled, and the width beside the one for known noise."""
+    """Draw coverage per parameter and pooled, and the width against the one for known noise."""
     figure = Figure(figsize=(11, 4.4))
     left, right = figure.subplots(1, 2)
     place = np.arange(len(cases))

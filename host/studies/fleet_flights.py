@@ -102,7 +102,7 @@ def answered(folder: Path) -> tuple[FleetAnswer, Place, int]:
 def rows_of(
     fleet: int, model: TypeModel, cg_m: Place, set_aside: int
 ) -> Iterator[dict[str, object]]:
-    """Yield each principal derivative beside what was drawn."""
+    """Yield each principal derivative and what was drawn."""
     truth = population(TRUTH_AIRCRAFT, FIRST_SEED - 1, cg_m)
     for name in PRINCIPAL:
         if name not in model.effects:

@@ -15,7 +15,7 @@ WILD = 0.15
 
 
 def coefficient_table(tally: CoefficientTally) -> Table:
-    """Return errors, half-widths and coverage per derivative; the thesis's method beside."""
+    """Return errors, half-widths and coverage per derivative, and those of the thesis's method."""
     own = tally.coefficients
     rows: list[tuple[Cell, ...]] = []
     for name, errors in own.error.items():
@@ -99,7 +99,7 @@ def thesis_flights_table(found: DetectedManeuver) -> Table:
 
 
 def thesis_flights_figure(found: DetectedManeuver) -> Figure:
-    """Draw what the program prints beside what it divides away."""
+    """Draw what the program prints and what it divides away."""
     figure = Figure(figsize=(9, 4.2))
     axis = figure.subplots()
     for shift, label, colour, values in (

@@ -1,7 +1,7 @@
 """Virtual flights through the whole chain: are maneuvers found, and do derivatives hold the truth?
 
 Every flight is flown by `host simulate` with its own seed, all tolerances drawn; windows and
-derivatives are compared with the truth file beside the log. Seeds below 200 were looked at while
+derivatives are compared with the truth file of the log. Seeds below 200 were looked at while
 the finder was written; the study starts at 200.
 """
 

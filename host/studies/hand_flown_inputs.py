@@ -1,4 +1,4 @@
-"""Which of a pilot's test inputs the finder finds in rows of 10 and 5 Hz, and what beside them.
+"""Which of a pilot's test inputs the finder finds in rows of 10 and 5 Hz, and what else.
 
 Records of `hand_flown`: seven inputs in five minutes each, and handling alone for the false ones.
 An input is found if both ends are within a second. Records are flown anew from their seeds.
@@ -28,7 +28,7 @@ class Score:
 
     flown: int = 0
     found: int = 0
-    beside: int = 0  # in records with inputs, none of them
+    others: int = 0  # in records with inputs, none of them
     false: int = 0
     handling_s: float = 0.0
 
@@ -37,7 +37,7 @@ class Score:
         share, hours = 100.0 * self.found / self.flown, self.handling_s / 3600.0
         return (
             f"{name:14s} {self.found:4d} of {self.flown:4d} found ({share:5.1f} %),"
-            f" {self.beside:3d} beside them; {self.false:3d} false in {hours:.1f} h without"
+            f" {self.others:3d} others; {self.false:3d} false in {hours:.1f} h without"
         )
 
 
@@ -60,7 +60,7 @@ def add_record(score: Score, columns: dict[str, Array], truth: Sequence[FlownByH
         return
     score.flown += len(truth)
     score.found += sum(is_found(one, found) for one in truth)
-    score.beside += sum(
+    score.others += sum(
         not any(
             item.axis == one.axis and item.start_s < one.end_s and item.input_end_s > one.start_s
             for one in truth

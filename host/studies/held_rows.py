@@ -1,4 +1,4 @@
-"""Rows that hold bank and pitch beside the same rows without: what identification gains by it.
+"""Rows that hold bank and pitch against the same rows without: what identification gains by it.
 
 Each pair has aircraft, instrument, air and pilot in common. The logger triggers, flies and records
 the rows; gains are those that `host tune --for mega` gave for `host simulate demo --seed 5`.
@@ -105,15 +105,15 @@ def _flown(gusts_mps: float, seed: int, hold: HoldGains | None) -> Iterator[dict
 
 def table(rows: Sequence[dict[str, str]]) -> list[str]:
     """Return a line for each air, with and without, then each coefficient's signed error."""
-    lines = ["gusts m/s  held  flights  rows done  told  hold %  median half-width %  score %"]
-    told = [r for r in rows if r["estimate"]]
+    lines = ["gusts m/s  held  flights  rows done   est  hold %  median half-width %  score %"]
+    answered = [r for r in rows if r["estimate"]]
     cells = sorted({(float(r["gusts_mps"]), int(r["held"])) for r in rows})
 
     def of(cell: tuple[float, int], among: Sequence[dict[str, str]]) -> list[dict[str, str]]:
         return [r for r in among if (float(r["gusts_mps"]), int(r["held"])) == cell]
 
     for cell in cells:
-        error, width = _shares(of(cell, told))
+        error, width = _shares(of(cell, answered))
         done = {r["seed"]: int(r["done"]) for r in of(cell, rows)}
         score = 100.0 * interval_score(abs(error), width)
         lines.append(
@@ -126,7 +126,7 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
     for name in PRINCIPAL:
         line = f"{name:10s}"
         for cell in cells:
-            error, width = _shares([r for r in of(cell, told) if r["name"] == name])
+            error, width = _shares([r for r in of(cell, answered) if r["name"] == name])
             z = error / width
             line += f"  {z.mean():+6.2f} +- {z.std() / len(z) ** 0.5:4.2f}" if len(z) else " " * 16
         lines.append(line)

@@ -59,7 +59,7 @@ class Estimate:
 
 
 def study(seeds: range) -> Iterator[Estimate]:
-    """Fly, write, import and identify; yield every coefficient that was told."""
+    """Fly, write, import and identify; yield every coefficient that was estimated."""
     for seed in seeds:
         record = fly(load("demo"), seed=seed)
         data = air_data(record)
@@ -118,7 +118,7 @@ def _estimates(
 
 
 def rows(found: list[Estimate]) -> list[tuple[str | int | float, ...]]:
-    """Return a row for each source: how much was told, held, agrees, how wide and how wrong."""
+    """Return a row for each source: how much was estimated, held, agrees, how wide, how wrong."""
     own = {(t.seed, t.name): t for t in found if t.source == OWN}
     result: list[tuple[str | int | float, ...]] = []
     for source in dict.fromkeys(t.source for t in found):

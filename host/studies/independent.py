@@ -3,7 +3,7 @@
 Eight cells of gusts and calm air, ideally placed sensors. Each flight is analysed without an
 aircraft file (dimensional derivatives), with one (coefficients; every tolerance of the file and
 of the sensors is drawn), or straight by ``coefficients``. One row a flight goes to a file that a
-later run continues; the last column of the table counts what stands under "trust" or "use with
+later run continues; the last column of the table counts what is marked "trust" or "use with
 care", and how many of those hold.
 """
 
@@ -92,7 +92,7 @@ def flown(air: Air, seed: int) -> Columns:
 def dimensional(measured: Columns, axis: str) -> Iterator[Found]:
     """Return name, truth, estimate, half-width and mark of derivatives, without an aircraft file.
 
-    Marks are those of the answer alone: no other method stands beside it here.
+    Marks are those of the answer alone: no other method is compared here.
     """
     # The airspeed of these flights has noise, no error of scale.
     exact = usual_errors(FOREIGN).scaled(0.0, "pitot_scale", "pitot_zero_pa", "density_share")

@@ -1,8 +1,8 @@
 """Does every named error of an instrument reach an interval? Ten times and a tenth, one by one.
 
 One flight, decoded once; each error of the instrument's file is made ten times and a tenth as
-large, and both answers of `host identify` are found again. An error that moves no interval is told
-by the data themselves: then many deviations of it are put into the data, and the answer stays.
+large, and both answers of `host identify` are found again. An error that moves no interval is known
+from the data themselves: then many deviations of it are put into the data, and the answer stays.
 Errors of servos and of the clock are looked at twice: on this flight, whose pots and GPS settle
 them, and on the same one had there been neither.
 """
@@ -96,7 +96,7 @@ SETTLED = {
     "servo zero": "pots measured what the servos did",
     "servo delay": "pots measured what the servos did",
     "servo speed": "pots measured what the servos did",
-    "clock": "GPS told the clock's scale while it was decoded (physical/timebase)",
+    "clock": "GPS gave the clock's scale while it was decoded (physical/timebase)",
 }
 POTS = ("pot_elevator", "pot_aileron_left", "pot_aileron_right", "pot_rudder")
 
@@ -208,7 +208,7 @@ def _why(flown: Flown, r: Reach, settled: str) -> str:
         return "; MOVES NOTHING"
     moved, name = shift_with(flown, r.group)
     return (
-        f"; told by the data: many deviations in them move {name} by {moved:.2f} half-widths:"
+        f"; known from the data: many deviations in them move {name} by {moved:.2f} half-widths:"
         f" {DATA_INFORMED[r.group][1]}"
     )
 

@@ -167,7 +167,7 @@ def lines(rows: Sequence[Row]) -> list[str]:
                 alarms = np.mean([p < 0.01 for _, n, p in tests if n])
                 rms = np.sqrt(np.mean(times**2))
                 result.append(
-                    f"  {group:18s} told in {len(times)} flights, rms {rms:.2f} times the file's,"
+                    f"  {group:18s} found in {len(times)} flights, rms {rms:.2f} times the file's,"
                     f" alone doubted in {100 * alarms:.0f} %"
                 )
     return result

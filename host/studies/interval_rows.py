@@ -1,4 +1,4 @@
-"""Estimates with intervals beside their truths: one table and one picture for every study."""
+"""Estimates with intervals and their truths: one table and one picture for every study."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def interval_table(title: str, groups: Mapping[str, Rows]) -> Table:
         one without an estimate was refused.
     """
     lines: list[tuple[Cell, ...]] = []
-    held = told = refused = 0
+    held = answered = refused = 0
     for group, rows in groups.items():
         refused += sum(not r["estimate"] for r in rows)
         for name in dict.fromkeys(r["name"] for r in rows if r["estimate"]):
@@ -37,14 +37,14 @@ def interval_table(title: str, groups: Mapping[str, Rows]) -> Table:
             error, width = _relative_percent(own)
             inside = np.abs(error) <= width
             rms = float(np.sqrt(np.mean(error**2)))
-            told, held = told + len(own), held + int(inside.sum())
+            answered, held = answered + len(own), held + int(inside.sum())
             lines.append(
                 (
                     group or "all", name, len(own), float(np.mean(error)), rms,
                     float(np.median(width)), int(inside.sum()), *_relied_on(own, inside),
                 )
             )  # fmt: skip
-    share = 100.0 * held / max(told, 1)
+    share = 100.0 * held / max(answered, 1)
     return Table(
         title,
         (
@@ -52,8 +52,8 @@ def interval_table(title: str, groups: Mapping[str, Rows]) -> Table:
             "median half-width %", "hold", "relied on", "of these hold",
         ),
         tuple(lines),
-        f"{held} of {told} intervals hold ({share:.1f} %); refused: {refused}. Errors are relative"
-        " to the rms of the true values. Relied on: under \"trust\" or \"use with care\".",
+        f"{held} of {answered} intervals hold ({share:.1f} %); refused: {refused}. Errors are"
+        " relative to the rms of the true values. Relied on: under \"trust\" or \"use with care\".",
     )  # fmt: skip
 
 

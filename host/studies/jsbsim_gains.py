@@ -259,7 +259,7 @@ def rows(case: Case, seed: int) -> Iterator[list[str | int | float]]:
             yield [title, "none", "", "", "", math.nan, math.nan]
             continue
         gains = best.gains
-        told = computed(problem, gains)
+        expected = computed(problem, gains)
         flown = measured(case, tuned, a)
         step = closed_loop(case, tuned, 9.0, step=a)
         share = (step.angle_rad[a][200:] - step.angle_rad[a][0]) / STEPS_RAD[a]
@@ -269,7 +269,7 @@ def rows(case: Case, seed: int) -> Iterator[list[str | int | float]]:
             title,
             ", ".join(f"{gains[role]:g}" for role in ("P", "I", "D")),
             f"{proven.worst_gain_db:.1f}, {proven.worst_phase_deg:.0f}",
-            f"{told.gain_db[0]:.1f}, {told.phase_deg[0]:.0f}",
+            f"{expected.gain_db[0]:.1f}, {expected.phase_deg[0]:.0f}",
             f"{flown.gain_db[0]:.1f}, {flown.phase_deg[0]:.0f}",
             rise if share.max() >= 0.9 else math.nan,
             max(100.0 * (float(share.max()) - 1.0), 0.0),

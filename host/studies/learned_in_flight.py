@@ -66,7 +66,7 @@ def card() -> Card:
 
 
 def flown(seed: int) -> Iterator[dict[str, object]]:
-    """Fly once; return a row for each derivative that a row of the card told at its end."""
+    """Fly once; return a row for each derivative that a row of the card sent at its end."""
     plane, plan = load_aircraft(AIRCRAFT), card()
     lines = calibration_of_text(calibration(plane), Path("calibration.toml"))
     axes = learned_axes(AIRCRAFT, plan, lines)
@@ -115,7 +115,7 @@ def lines_of(rows: Sequence[Mapping[str, str]]) -> list[str]:
     def column(own: Sequence[Mapping[str, str]], name: str) -> Array:
         return np.array([float(row[name]) for row in own])
 
-    lines = ["row    name       told    error: mean    rms    half-width   enough   holds"]
+    lines = ["row    name       sent    error: mean    rms    half-width   enough   holds"]
     for key in dict.fromkeys((row["row"], row["name"]) for row in rows):
         own = [row for row in rows if (row["row"], row["name"]) == key]
         true, half = column(own, "true"), column(own, "half_width")

@@ -1,9 +1,9 @@
-"""Without vanes: angles against the air, derivatives against the truth, beside the same flights'
-own logs with vanes.
+"""Without vanes: angles against the air, derivatives against the truth and the same
+flights' own logs with vanes.
 
 Each flight of the card `demo` is flown once with all tolerances drawn, in calm air or in gusts. Its
 own log has vanes; the log that a PX4 plane would have written has none. Before the launch it stands
-at a pitch that an inclinometer told to `INCLINOMETER_RAD`; angles are reconstructed without that
+at a pitch that an inclinometer gave to `INCLINOMETER_RAD`; angles are reconstructed without that
 too. One row a number goes to a file that a later run continues.
 """
 
@@ -50,15 +50,15 @@ STANDS_S = 1.0
 INCLINOMETER_RAD = np.radians(0.25)  # one deviation: of the instrument and of the ground
 ANGLES = {"alpha": 1, "beta": 2}  # and the axis that the IMU's tilt turns them about
 OPEN = ", tilt open"  # behind an angle: nobody measured how the aircraft stands
-# Of an angle: rms, mean and told deviation of its error, tilt of the IMU, deg.
+# Of an angle: rms, mean and stated deviation of its error, tilt of the IMU, deg.
 COLUMNS = (
     "seed", "turbulence_mps", "name", "true", "estimate", "half_width", "mark", "with_vanes",
-    "rms_deg", "mean_deg", "told_deg", "tilt_deg",
+    "rms_deg", "mean_deg", "stated_deg", "tilt_deg",
 )  # fmt: skip
 
 
-def rows_of(seed: int, turbulence_mps: float, *, beside: bool = False) -> Iterator[Row]:
-    """Fly, hide the vanes, reconstruct and identify; `beside` identifies the own log too."""
+def rows_of(seed: int, turbulence_mps: float, *, with_own: bool = False) -> Iterator[Row]:
+    """Fly, hide the vanes, reconstruct and identify; `with_own` identifies the own log too."""
     card = load("demo")
     card = replace(
         card,
@@ -80,7 +80,7 @@ def rows_of(seed: int, turbulence_mps: float, *, beside: bool = False) -> Iterat
             return
         bare = prepare(read_flight(path, ReadingOptions(), aircraft_data(AIRCRAFT)))
         vanes = {}
-        if beside:
+        if with_own:
             # The same flight of our own instrument: an autopilot's errors are not ours.
             ours = fly(card, seed=seed)
             own, by = own_log(ours, air_data(ours), stem)
@@ -132,7 +132,7 @@ def _angles(
         yield {
             "name": name + kind, "rms_deg": float(np.sqrt(np.mean(error**2))),
             "mean_deg": float(error.mean()),
-            "told_deg": float(np.degrees(getattr(flight.angles, f"{name}_sd_rad"))),
+            "stated_deg": float(np.degrees(getattr(flight.angles, f"{name}_sd_rad"))),
             "tilt_deg": float(tilt[axis]),
         }  # fmt: skip
 
@@ -160,7 +160,7 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
     """Return the lines of both tables, and what all intervals of a cell come to."""
     lines = [
         "| gusts m/s | angle | median rms deg | worst | about its mean | less the IMU's tilt"
-        " | told sd |"
+        " | stated sd |"
     ]
     cells = [[r for r in rows if float(r["turbulence_mps"]) == t] for t in TURBULENCE_MPS]
     every = [*ANGLES, *(name + OPEN for name in ANGLES)]
@@ -207,7 +207,7 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
 
 def _angle_numbers(own: Sequence[dict[str, str]]) -> tuple[float, ...]:
     rms, mean, stated, tilt = (
-        np.array([float(r[f"{k}_deg"]) for r in own]) for k in ("rms", "mean", "told", "tilt")
+        np.array([float(r[f"{k}_deg"]) for r in own]) for k in ("rms", "mean", "stated", "tilt")
     )
     about = np.sqrt(np.maximum(rms**2 - mean**2, 0.0))
     # The tilt turns alpha and beta against the air by as much, of opposite sign laterally.
@@ -240,7 +240,7 @@ def main(arguments: list[str] | None = None) -> int:
     prefer_machine_code()
 
     def both(seed: int, turbulence_mps: float) -> Iterator[Row]:
-        return rows_of(seed, turbulence_mps, beside=seed < run.seeds.start + WITH_VANES)
+        return rows_of(seed, turbulence_mps, with_own=seed < run.seeds.start + WITH_VANES)
 
     rows = flown_rows(run.rows, COLUMNS, product(run.seeds, TURBULENCE_MPS), both)
     return run.report(rows, table)

@@ -148,7 +148,7 @@ def rows_of(flight: Flown, seed: int) -> Iterator[dict[str, object]]:
             truth = flight.maneuvers[ROWS[row.name][1]]["derivatives"]
             ours, exact = (learned(row.card, row.samples, double=d) for d in (False, True))
             known = int(np.searchsorted(flight.t_s, row.end_s + LIVE_BEHIND_S))
-            beside = live.of(_until(read, known)).values
+            ground = live.of(_until(read, known)).values
             for after_s in AFTER_S:
                 one, other = (_last(found, after_s) for found in (ours, exact))
                 if one is None or other is None or (after_s < 99.0 and len(ours) <= after_s):
@@ -157,7 +157,7 @@ def rows_of(flight: Flown, seed: int) -> Iterator[dict[str, object]]:
                     value = (
                         seed, row.name, after_s, name, truth[name], one.estimate[k],
                         one.half_width[k], other.estimate[k], other.half_width[k],
-                        *beside.get(name, (np.nan, np.nan)),
+                        *ground.get(name, (np.nan, np.nan)),
                     )  # fmt: skip
                     yield dict(zip(COLUMNS, value, strict=True))
 

@@ -1,6 +1,6 @@
-"""What `host plan` promises beside what flights of that card achieve, through the recorder.
+"""What `host plan` promises against what flights of that card achieve, through the recorder.
 
-One row a coefficient, flight and estimator goes to a file that a later run continues. Beside it:
+One row a coefficient, flight and estimator goes to a file that a later run continues. And
 where a half-width is what `host live` calls enough, is the coefficient trusted at home?
 """
 
@@ -62,7 +62,7 @@ def rows_of(
     truth = {"first_row_s": 0.0, "maneuver": list(flight.maneuvers)}
     rows: list[dict[str, object]] = []
     for model in (DEFAULT, COEFFICIENTS):
-        told: dict[str, tuple[Any, ...]] = {}
+        found: dict[str, tuple[Any, ...]] = {}
         try:
             answer = identify_columns(
                 at_hand(columns, aircraft=card.aircraft),
@@ -73,11 +73,11 @@ def rows_of(
             for of, compared in answer.document()["truth"].items():
                 for name, own in compared.items():
                     values = (own["truth"], own["value"], own["half_width"], marks.get((of, name)))
-                    told[name] = values
+                    found[name] = values
         except IdentificationError:
             pass
         for name in PRINCIPAL:
-            values = told.get(name, (np.nan, np.nan, np.inf, MISSING))
+            values = found.get(name, (np.nan, np.nan, np.inf, MISSING))
             row = (cell, seed, model, name, *values, promised.get(name, np.nan))
             rows.append(dict(zip(COLUMNS, row, strict=True)))
     return rows

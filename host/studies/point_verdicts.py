@@ -3,7 +3,7 @@
 One flight is one test point, flown through the recorder by a pilot with one drawn fault or none.
 The verdict: from its radio as the firmware sends it, whole and with one envelope in twenty lost in
 bursts. Truth: the same inputs flown in other gusts with other sensor noise, identified at 100 Hz,
-the median of their half-widths beside those that `host plan --alone` promises. A row a flight and
+the median of their half-widths against those that `host plan --alone` promises. A row a flight and
 loss goes to a file that a later run continues.
 """
 

@@ -150,7 +150,7 @@ def check_model(
     seed: int = 1,
     from_truth: bool = False,
 ) -> RefusalCheck:
-    """Fit a model by output error to noisy states; set its judgement beside the analytic bound.
+    """Fit a model by output error to noisy states; compare its judgement with the analytic bound.
 
     With `from_truth` the search begins at the truth: what a perfect search could know.
     """

@@ -45,7 +45,7 @@ class RowStudy:
     fly : callable
         Given the entries of a key, its rows.
     group : tuple of str
-        The columns that name a line of the table, beside the derivative.
+        The columns that name a line of the table, besides the derivative.
     first_seed : int
     flights : tuple of int
         Of a small and of a full run.
@@ -135,7 +135,7 @@ ROW_STUDIES = {
         flights=(1, 6),
     ),
     "m_wrong_models": RowStudy(
-        "Wrong models beside right ones, relative to the truth",
+        "Wrong models against right ones, relative to the truth",
         WRONG_COLUMNS,
         _wrong_keys,
         wrong_rows,
@@ -168,7 +168,7 @@ ROW_STUDIES = {
         names=(*shipped_models.PRINCIPAL, *shipped_models.ERROR_SD),
     ),
     "p_spoilt_columns": RowStudy(
-        "Columns quantised, held and free of noise, beside the unspoilt ones",
+        "Columns quantised, held and free of noise, against the unspoilt ones",
         spoilt_columns.COLUMNS,
         lambda seeds, small: (
             (cell, seed) for seed in seeds for cell in spoilt_columns.CELLS[: 1 if small else None]

@@ -157,14 +157,14 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
                 some = [
                     r for r in rows if (r["aircraft"], r["air"], r["model"]) == (name, air, model)
                 ]
-                told = [r for r in some if r["name"] != "refused"]
-                relied = [r for r in told if r["mark"] in (TRUSTED, CAREFUL)]
-                held, held_relied = sum(map(_held, told)), sum(map(_held, relied))
+                answered = [r for r in some if r["name"] != "refused"]
+                relied = [r for r in answered if r["mark"] in (TRUSTED, CAREFUL)]
+                held, held_relied = sum(map(_held, answered)), sum(map(_held, relied))
                 relied_all, held_all = relied_all + len(relied), held_all + held_relied
                 lines.append(
-                    f"{name:16s}{air:18s}{model:11s}{len(relied):4d} of {len(told):3d}"
+                    f"{name:16s}{air:18s}{model:11s}{len(relied):4d} of {len(answered):3d}"
                     f"  {held_relied:5d} of {len(relied):3d}"
-                    f"  {held:5d} of {len(told):3d}  {len(some) - len(told):3d}"
+                    f"  {held:5d} of {len(answered):3d}  {len(some) - len(answered):3d}"
                 )
     share = 100.0 * held_all / max(relied_all, 1)
     return [*lines, f"of {relied_all} relied on {held_all} hold ({share:.1f} %)"]

@@ -1,4 +1,4 @@
-"""Estimates from columns that are quantised, held or free of noise, beside the unspoilt ones.
+"""Estimates from columns that are quantised, held or free of noise, against the unspoilt ones.
 
 Flights of the independent simulator, without and with an aircraft file. Wanted: spoilt columns
 give estimates within their intervals of the unspoilt ones, and intervals that hold. One row an

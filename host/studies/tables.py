@@ -91,7 +91,7 @@ def accuracy_table(cases: Sequence[Accuracy]) -> Table:
 def coverage_table(cases: Sequence[Coverage]) -> Table:
     """Return coverage and width of the default intervals, a row per noise and rate."""
     return Table(
-        "Coverage of the default 95 % intervals; the code is not told the noise",
+        "Coverage of the default 95 % intervals; the code does not get the noise",
         (
             "noise", "rate Hz", "runs", "failed", "pooled %", "lowest %", "of", "highest %",
             "width/known median", "width/known most", "pooled %, taken for white",
@@ -192,8 +192,8 @@ def imported_table(found: Sequence[Estimate]) -> Table:
     return Table(
         "The same flights as our logger, PX4 and ArduPilot had logged them",
         (
-            "log", "told", "held %", "agrees with the own log %", "half-width over the own log's",
-            "median error %",
+            "log", "estimated", "held %", "agrees with the own log %",
+            "half-width over the own log's", "median error %",
         ),
         tuple(rows(list(found))),
         "Nine principal coefficients of each flight (eight with elevons). Held: the 95 % interval"

@@ -131,7 +131,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seeds", type=int, default=100)
     options = parser.parse_args(arguments)
     write = sys.stdout.write
-    write("table 3.2 re-run (noise-free): parameter error beside the thesis's own figure\n")
+    write("table 3.2 re-run (noise-free): parameter error and the thesis's own figure\n")
     for run in table_32(options.iterations):
         verdict = (
             "diverged"

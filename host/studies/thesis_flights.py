@@ -3,8 +3,8 @@
 Kadet LT-40 at 10 rows a second (a 2 s elevator pulse, four seconds used) and Low Super Trainer at
 20 (3-2-1-1, 77 rows used), all faults of the original logger in the rows. The model is the original
 one (every entry of A and B free, total values, no bias), the fit its line search, started from
-least squares, which is kinder than its own start. Both of its figures stand beside honest ones, a
-model that knows nothing, and this product on the same flights. Simulated throughout.
+least squares, which is kinder than its own start. Both of its figures are set against honest
+ones, a model that knows nothing, and this product on the same flights. Simulated throughout.
 """
 
 from __future__ import annotations
@@ -205,7 +205,7 @@ def lines(case: Case, figures: Sequence[Figures], ours: Sequence[tuple[float, fl
 
 
 def study(flights: int) -> list[tuple[Case, list[Figures], list[tuple[float, float]]]]:
-    """Re-enact every window with `flights` seeds, this product's answer beside."""
+    """Re-enact every window with `flights` seeds, and this product's answer."""
     seeds = range(FIRST_SEED, FIRST_SEED + flights)
     return [
         (case, [re_enact(case, seed) for seed in seeds], [product(case, seed) for seed in seeds])

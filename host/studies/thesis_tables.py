@@ -1,7 +1,7 @@
 """Table 3.1 row by row, figures 3.5 to 3.8 and the period column of table 3.2 of the thesis.
 
 The network as printed, at the largest stable step and by the original program's line search, all
-from zero, noise-free and at SNR 10, beside its own fixed point (least squares). Simulated data of
+from zero, noise-free and at SNR 10, and its own fixed point (least squares). Simulated data of
 `thesis.thesis_data`: 3-2-1-1 of 0.1 rad, 20 s at 100 Hz.
 """
 

@@ -1,6 +1,6 @@
 """A user's linear model in four kinds of noise: is the default the best?
 
-White noise, noise with a memory, gusts, and white noise beside a moment that the model lacks. A
+White noise, noise with a memory, gusts, and white noise with a moment that the model lacks. A
 short period flies 3-2-1-1s behind a servo; every flight is fitted as `host identify --model
 mine.toml` fits it, by the default and by each of the three methods that it chooses among. One row a
 flight, method and derivative goes to a file that a later run continues.

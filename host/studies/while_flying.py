@@ -1,4 +1,4 @@
-"""Estimates while flying, from the radio's rows, beside the truth and beside what comes later.
+"""Estimates while flying, from the radio's rows, against the truth and what comes later.
 
 After each completed test point all that was received until then is estimated from, as the page of
 `host live` does; after the flight the log of the card is identified. One row an estimate goes to a

@@ -1,7 +1,7 @@
-"""Is "trust" earned? Deliberately wrong models beside right ones, judged as `host identify` judges.
+"""Is "trust" earned? Wrong models against right ones, judged as `host identify` judges.
 
 Linear flights of known derivatives (`wrong_flights`); a wrong model lacks a derivative or a servo's
-lag, is linear where the aircraft is not, or is told an airspeed that is 10 % wrong. A parameter
+lag, is linear where the aircraft is not, or gets an airspeed that is 10 % wrong. A parameter
 without a truth is compared with what the same estimator says without noise.
 """
 
@@ -59,7 +59,7 @@ class Judged:
 
     @property
     def relied_on(self) -> bool:
-        """Whether a reader is told to use it."""
+        """Whether a reader may use it."""
         return self.mark in (TRUSTED, CAREFUL)
 
 

@@ -1,6 +1,6 @@
 """An aircraft that no linear model has: bent curves, a tail in the wake of the wing, free play.
 
-Six equations of motion in body axes like those of `studies.foreign`, and beside them two states of
+Six equations of motion in body axes like those of `studies.foreign`, and besides them two states of
 the air at the tail. The equations are machine code where numba is installed.
 """
 

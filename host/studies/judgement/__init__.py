@@ -1,1 +1,1 @@
-"""One score over worlds: what of an answer is right, what is told to be, how honest the widths."""
+"""One score over worlds: what of an answer is right, what is called right, are widths honest."""

@@ -46,7 +46,7 @@ def without_file(seed: int) -> Flown:
 
     def identify() -> Identification:
         columns, _ = even_columns(pd.DataFrame(record))
-        told = Recording(commanded=SURFACES, maker=FOREIGN)
-        return identify_columns(at_hand(columns, recording=told), truth=truth)
+        recording = Recording(commanded=SURFACES, maker=FOREIGN)
+        return identify_columns(at_hand(columns, recording=recording), truth=truth)
 
     return Flown(truth, identify)

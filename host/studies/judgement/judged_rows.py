@@ -30,9 +30,9 @@ PRINCIPAL = {
     "CL_alpha", "Cm_alpha", "Cm_q", "Cm_de", "Cl_p", "Cl_da", "Cn_beta", "Cn_r", "Cn_dr",
 }  # fmt: skip
 MISSING = "missing"
-MODE = "mode"  # in place of a mark: modes are kept beside, and not judged
+MODE = "mode"  # in place of a mark: modes are kept apart, and not judged
 Truth = dict[str, Any]
-Told = dict[str, dict[str, object]]
+Estimates = dict[str, dict[str, object]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,12 +61,12 @@ def judged_rows(world: str, seed: int, flown: Flown, names: tuple[str, ...]) -> 
         answer: Identification | None = flown.identify()
     except IdentificationError:
         answer = None
-    told, modes = _estimates(answer) if answer is not None else ({}, {})
+    found, modes = _estimates(answer) if answer is not None else ({}, {})
     cpu_s = time.process_time() - start
     for name in names:
         row = {"world": world, "seed": seed, "name": name, "cpu_s": round(cpu_s, 2)}
-        if name in told:
-            yield row | told[name]
+        if name in found:
+            yield row | found[name]
         else:
             true = _mean_truth(flown.truth, name)
             yield row | {"true": true, "reference": abs(true), "mark": MISSING}
@@ -74,11 +74,11 @@ def judged_rows(world: str, seed: int, flown: Flown, names: tuple[str, ...]) -> 
         yield {"world": world, "seed": seed, "name": name, "cpu_s": round(cpu_s, 2)} | own
 
 
-def _estimates(answer: Identification) -> tuple[Told, Told]:
-    """Return what is told of each parameter that the truth has, and of each mode."""
+def _estimates(answer: Identification) -> tuple[Estimates, Estimates]:
+    """Return the estimate of each parameter that the truth has, and of each mode."""
     marks = answer.table["verdict"].to_dict()
-    found: Told = {}
-    modes: Told = {}
+    found: Estimates = {}
+    modes: Estimates = {}
     for model, compared in answer.document()["truth"].items():
         for name, own in compared.items():
             mark = marks.get((model, name), MODE)

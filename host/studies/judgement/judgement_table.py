@@ -57,14 +57,14 @@ def mode_lines(rows: Mapping[str, Sequence[Mapping[str, str]]]) -> Iterator[str]
     """Return for each world how many intervals of each mode hold."""
     for world, own in rows.items():
         modes = [r for r in own if r["mark"] == MODE]
-        told = []
+        parts = []
         for name in dict.fromkeys(r["name"] for r in modes):
             mine = [r for r in modes if r["name"] == name]
             off = [abs(float(r["estimate"]) - float(r["true"])) for r in mine]
             held = sum(x <= float(r["half_width"]) for x, r in zip(off, mine, strict=True))
-            told.append(f"{name} {held} of {len(mine)}")
-        if told:
-            yield f"modes that hold, {world}: {'; '.join(told)}"
+            parts.append(f"{name} {held} of {len(mine)}")
+        if parts:
+            yield f"modes that hold, {world}: {'; '.join(parts)}"
 
 
 def part(own: Judged, chosen: BoolArray) -> Judged:

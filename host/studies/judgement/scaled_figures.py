@@ -116,8 +116,8 @@ def _honesty(own: Judged) -> Callable[[Array], float]:
             if (total := float(np.sum(weight))) > 0.0:
                 rms = float(np.sqrt(np.sum(weight * error**2) / total))
                 ideal = interval_score(error, np.full(len(error), NORMAL_95 * rms))
-                told = interval_score(error, width)
-                found += float(np.sum(weight * told) / max(np.sum(weight * ideal), 1e-300))
+                own = interval_score(error, width)
+                found += float(np.sum(weight * own) / max(np.sum(weight * ideal), 1e-300))
                 count += 1.0
         return found / count if count else float("nan")
 

@@ -47,8 +47,8 @@ def without_file(seed: int) -> Flown:
     measured, true = _flown(seed)
     # Places turn forces by the true rates' slopes, so noise comes last.
     noise = {n: measured[n] - true[n] for n in true}
-    told = with_default_errors(true, np.random.default_rng([DRAW, seed]))
-    table = {n: told[n] + noise[n] for n in told}
+    wrong = with_default_errors(true, np.random.default_rng([DRAW, seed]))
+    table = {n: wrong[n] + noise[n] for n in wrong}
     truth = truth_of(true)
 
     def identify() -> Identification:

@@ -41,8 +41,8 @@ def with_file(seed: int, models: str | None = None) -> Flown:
 
 def without_file(seed: int) -> Flown:
     """Return a flight of an instrument out of the box, of which nothing is known."""
-    told = zeroed_pitots(errors_without_file(OWN))
-    return _flown(virtual_flight(CARD, seed, errors=out_of_the_box()), None, told=told)
+    errors = zeroed_pitots(errors_without_file(OWN))
+    return _flown(virtual_flight(CARD, seed, errors=out_of_the_box()), None, known=errors)
 
 
 def calibrated_without_file(seed: int) -> Flown:
@@ -93,13 +93,13 @@ def _flown(
     flight: VirtualFlight,
     aircraft: str | None,
     models: str | None = None,
-    told: InstrumentErrors | None = None,
+    known: InstrumentErrors | None = None,
 ) -> Flown:
     truth: Truth = {"first_row_s": 0.0, "maneuver": list(flight.maneuvers)}
     columns, _notes = even_columns(flight.table)
 
     def identify() -> Identification:
-        flight = at_hand(columns, aircraft=aircraft, errors=told)
+        flight = at_hand(columns, aircraft=aircraft, errors=known)
         return identify_columns(flight, models=models, truth=truth)
 
     return Flown(truth, identify)

@@ -34,5 +34,5 @@ WORLDS = {
     "independent, no file": World(trainer_flights.without_file, DERIVATIVES),
     "independent, file": World(trainer_flights.with_file, COEFFICIENTS),
     "real records, no file": World(field_flights.without_file, DERIVATIVES, least_relied=60.0),
-    "perfect sensors, told": World(trainer_flights.perfect_sensors, DERIVATIVES, apart=True),
+    "perfect sensors, known": World(trainer_flights.perfect_sensors, DERIVATIVES, apart=True),
 }

@@ -134,8 +134,8 @@ def real_records(air_mps: float, seed: int, method: str | None) -> Flown:
     def identify() -> Identification:
         with tempfile.TemporaryDirectory() as folder:
             file = measured_file(Path(folder), rng, by)
-            told = Recording(commanded=SURFACES, maker=FOREIGN)
-            flight = at_hand(record, aircraft=file, recording=told)
+            recording = Recording(commanded=SURFACES, maker=FOREIGN)
+            flight = at_hand(record, aircraft=file, recording=recording)
             return identify_columns(flight, models=MODEL, methods=method, truth=truth)
 
     return Flown(truth, identify)

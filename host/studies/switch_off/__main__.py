@@ -79,16 +79,16 @@ def _line(
 def _figures(one: Judged, scale: Mapping[str, float], mine: BoolArray) -> dict[str, float]:
     error, width = (np.minimum(x[mine], MOST) for x in (one.error, one.width))
     by: Array = np.array([scale.get(str(n), np.nan) for n in one.name[mine]])
-    told = one.answered[mine]
+    known = one.answered[mine]
     count = max(int(np.sum(mine)), 1)
     answered = interval_score(error, width)
     return {
-        "score": float(np.mean(np.where(told, answered, 2.0) / by)),
-        "rms": 100.0 * float(np.sqrt(np.mean(np.where(told, error, MOST) ** 2))),
+        "score": float(np.mean(np.where(known, answered, 2.0) / by)),
+        "rms": 100.0 * float(np.sqrt(np.mean(np.where(known, error, MOST) ** 2))),
         "holds": 100.0 * float(np.mean(one.holds[mine])),
         "right relied": 100.0 * float(np.sum((one.right & one.relied)[mine])) / count,
         "wrong relied": 100.0 * float(np.sum((one.wrong & one.relied)[mine])) / count,
-        "width": float(np.mean(np.where(told, width, MOST) / by)),
+        "width": float(np.mean(np.where(known, width, MOST) / by)),
     }
 
 

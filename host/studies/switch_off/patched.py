@@ -16,7 +16,7 @@ def switch_off(off: Mapping[str, Any]) -> None:
     Parameters
     ----------
     off : mapping
-        ``module:name`` below `host.sysid` to what stands in its place.
+        ``module:name`` below `host.sysid` to what replaces it.
     """
     for path, value in off.items():
         module, _, name = path.partition(":")

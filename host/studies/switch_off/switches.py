@@ -1,4 +1,4 @@
-"""Steps of the default path, and what stands in their place when each is switched off.
+"""Steps of the default path, and what replaces them when each is switched off.
 
 A switch replaces functions by their import path, in the process that runs it alone: the product has
 no code for it. `off` is called with the arguments of the function that it stands for.
@@ -17,7 +17,7 @@ ROOM = "host.sysid."
 
 @dataclass(frozen=True, slots=True)
 class Switch:
-    """A step, what it does, and what stands in place of which functions without it."""
+    """A step, what it does, and what replaces which functions without it."""
 
     name: str
     does: str
@@ -99,7 +99,7 @@ SWITCHES = (
     ),
     _one(
         "echoes",
-        "drops inputs that follow the attitude or swing faintly beside another",
+        "drops inputs that follow the attitude or swing faintly next to another",
         "maneuvers.overlapping_inputs:without_echoes",
         _straight,
     ),
@@ -183,7 +183,7 @@ SWITCHES = (
         gives(False),
     ),
     _one(
-        "beside the IMU",
+        "IMU and vane",
         "widens the zero of the alpha vane without GPS",
         "reconstruction.reconstruction:_with_imu_errors",
         _vane_zero,
@@ -238,14 +238,14 @@ SWITCHES = (
         _no_first_departures,
     ),
     _one(
-        "gusts beside reduced",
+        "gusts in reduced",
         "lets reduced templates have the gust where data show it",
         "linear.left_out_motion:_in_gusts",
         gives(None),
     ),
     _one(
         "reduced templates",
-        "fits reduced templates with the motion beside them",
+        "fits reduced templates with the motion they leave out",
         "linear.left_out_motion:fit_with_left_out",
         gives(None),
     ),
@@ -257,7 +257,7 @@ SWITCHES = (
     ),
     _one(
         "thrust",
-        "fits what measured thrust does beside a template",
+        "fits what measured thrust adds to a template",
         "aerodynamics.thrust_terms:thrust_terms",
         gives(()),
     ),
@@ -378,7 +378,7 @@ SWITCHES = (
         gives(None),
     ),
     _one(
-        "known beside",
+        "errors in residuals",
         "lets the test of residuals know the instrument's errors",
         "errors.systematic_errors:systematic_residuals",
         gives([]),

@@ -4,7 +4,7 @@
 
 One flight of card `demo` is identified and tuned. Its gains are fixed, then flown on aircraft drawn
 from the tolerances of the aircraft file around its truth, and on linear ones drawn from the
-answer's covariance; beside them the autopilot's default gains, and those of PX4's autotune.
+answer's covariance; besides them the autopilot's default gains, and those of PX4's autotune.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ def from_covariance(found: Tuning, count: int, seed: int) -> Table:
         )
         for speed, flown in flights:
             row = list(_row(f"{step}, {speed:.1f} m/s", flown, demand))
-            row[COLUMNS.index("surface rad/s rms")] = math.nan  # the servo's part is not told
+            row[COLUMNS.index("surface rad/s rms")] = math.nan  # the servo's part is not known
             rows.append(tuple(row))
     return Table(f"{found.autopilot.name}, linear aircraft of the covariance", COLUMNS, tuple(rows))
 

@@ -1,4 +1,4 @@
-"""What is told of a step: rise time, overshoot, settling, and how much the surface moves."""
+"""Figures of a step: rise time, overshoot, settling, and how much the surface moves."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ def step_figures(flown: Flown, demand: Demand) -> Array:
     Not a number where the step never gets there.
     """
     axis = "roll" if demand.bank_rad else "pitch"
-    told, size = _stepped(flown, demand)
+    stepped, size = _stepped(flown, demand)
     behind = flown.t_s >= demand.at_s
     t = flown.t_s[behind] - demand.at_s
-    share = (told[behind] - told[0]) / size
+    share = (stepped[behind] - stepped[0]) / size
     rise = _first(t, share >= 0.9) - _first(t, share >= 0.1)
     outside = np.flatnonzero(np.abs(share - 1.0) > SETTLED_SHARE)
     settled = 0.0
@@ -49,8 +49,8 @@ def moving_at_the_end(flown: Flown, demand: Demand) -> bool:
     A surface; behind a step of height or airspeed these too, by a share of the step.
     """
     if demand.height_m or demand.airspeed_mps:
-        told, size = _stepped(flown, demand)
-        if np.ptp(told[flown.t_s >= flown.t_s[-1] - SLOW_END_S]) > MOVING_SHARE * abs(size):
+        stepped, size = _stepped(flown, demand)
+        if np.ptp(stepped[flown.t_s >= flown.t_s[-1] - SLOW_END_S]) > MOVING_SHARE * abs(size):
             return True
     end = flown.t_s >= flown.t_s[-1] - END_S
     for surface in flown.surface_rad.values():

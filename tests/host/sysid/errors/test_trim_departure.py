@@ -220,7 +220,7 @@ def test_a_linear_record_has_no_departures() -> None:
 def test_drag_follows_the_lift_of_pitching_too() -> None:
     """Where the polar has all lift D_de was high by two half-widths, D_alpha by one."""
     names = ("D_alpha", "D_de")
-    for row in judged_rows("perfect sensors, told", 18, perfect_sensors(18), names):
+    for row in judged_rows("perfect sensors, known", 18, perfect_sensors(18), names):
         if row["name"] in names:
             estimate, true, half = (float(str(row[k])) for k in ("estimate", "true", "half_width"))
             assert abs(estimate - true) < 0.85 * half
