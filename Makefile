@@ -49,7 +49,7 @@ format: setup ## rewrite C++ and Python in the house format
 	@find firmware tests protocol -name '*.[hc]' -o -name '*.cpp' | grep -v /generated/ | xargs .venv/bin/clang-format -i
 	@.venv/bin/ruff format --quiet .
 
-bench: setup ## damage, speed and identification beside their peers
+bench: setup ## damage, speed and identification against their peers
 	@bad=0; for part in $(BENCHES); do $(PYTHON) tests/bench/$$part.py || bad=$$?; done; exit $$bad
 
 study: setup sitl ## tables and pictures of identification in build/study, nine minutes (SIZE=full: two hours)

@@ -34,7 +34,7 @@ pictures_ready() { command -v dot >/dev/null && command -v rsvg-convert >/dev/nu
 install_packages() {
   command -v apt-get >/dev/null ||
     stop "no apt here: install KiCad 9 with its symbols and footprints, graphviz, rsvg-convert"
-  # The backports stand beside what this system takes Debian from already.
+  # The backports come on top of what this system takes Debian from already.
   local archive source
   archive="$(apt-get indextargets --format '$(RELEASE) $(COMPONENT) $(SITE)' 'Created-By: Packages' |
     sed -n 's/^bookworm main //p' | head -n 1)"

@@ -95,8 +95,8 @@ def measured(page: str, numbers: list[str]) -> tuple[str, str]:
     newer = now, _git("rev-parse", "--short=8", "HEAD").strip()
     log = _git("log", "--follow", "--name-only", "--format=@%h %cs", "--abbrev=8", "--", page)
     for entry in log.split("@")[1:]:
-        told, _, name = entry.partition("\n")
-        commit, day = told.split()
+        stamp, _, name = entry.partition("\n")
+        commit, day = stamp.split()
         had = Counter(NUMBER.findall(_git("show", f"{commit}:{name.strip()}")))
         if Counter(numbers) - had:  # some of them came later
             return newer

@@ -1,7 +1,7 @@
 """`make docs`: the pages of this clone as a searchable site, with API and notebooks that were run.
 
 Pages keep their places, so that their links work; what they link to and is no page (a picture, a
-settings file) is copied beside them. The site needs no network: build/docs/site/index.html.
+settings file) is copied with them. The site needs no network: build/docs/site/index.html.
 """
 
 from __future__ import annotations
