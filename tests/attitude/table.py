@@ -1,4 +1,4 @@
-"""Print the attitude errors of the firmware's filter beside those of the original algorithm.
+"""Print the attitude errors of the firmware's filter against those of the original algorithm.
 
     .venv/bin/python tests/attitude/table.py            three cards, two seeds each
     .venv/bin/python tests/attitude/table.py --seeds 8

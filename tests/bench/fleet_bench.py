@@ -43,7 +43,7 @@ AIRCRAFT = "ultrastick25e"
 MINUTES, SEED = 5.0, 22_900
 SLEEPS = "tests.bench.fleet_work:slept"
 LEAST_RATIO, MOST_OVERHEAD = 1.7, 0.10
-QUIET_LOAD = 0.5  # processes that wait or run beside us
+QUIET_LOAD = 0.5  # processes that wait or run next to us
 _FOLDERS = 50  # aircraft of the sleeping fleet
 
 

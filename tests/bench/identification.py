@@ -80,13 +80,13 @@ def output_error(seeds: int) -> bool:
     for name, seconds in peers.items():
         ratio = 1e3 * seconds / whole
         print(f"{name}: {seconds:.1f} s, {ratio:.0f} times ours (limit {PEER_RATIO:.0f})")
-    print(f"  AeroID, told the noise, ends {off:.2g} bounds from our optimum")
+    print(f"  AeroID, given the noise, ends {off:.2g} bounds from our optimum")
     slow = min(peers.values()) < PEER_RATIO * 1e-3 * whole
     return whole > LIMIT_MS or distance > STEP_LIMIT or slow
 
 
 def main() -> int:
-    """Print the figures beside their limits; exit 6 if one is missed."""
+    """Print the figures and their limits; exit 6 if one is missed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=100)
     options = parser.parse_args()

@@ -1,4 +1,4 @@
-"""A user's non-linear model beside the same model hand-written in numpy with scipy's solver.
+"""A user's non-linear model against the same model hand-written in numpy with scipy's solver.
 
     python tests/bench/identification_equations.py
 
@@ -157,7 +157,7 @@ def main() -> int:
     first, bound = problem.first_guess(), np.sqrt(np.diag(ours.covariance_white))
 
     def residual(z: Array) -> Array:
-        theta = first + bound * z  # the peer is told how large a parameter's step should be
+        theta = first + bound * z  # the peer is given how large a parameter's step should be
         left = (by_hand(theta, data.inputs) - data.outputs) / deviation
         return np.concatenate([left.ravel(), root * (theta - problem.prior_mean)[with_prior]])
 

@@ -1,8 +1,8 @@
 """Closed-form least squares against the printed Hopfield iteration, both compiled alike.
 
 Iterations grow with the condition of the normal matrix, which is a matter of units: speed in feet
-per second beside radians makes it eleven times that of metres. The claim is about feet, in which
-book and thesis print the aircraft; metres stand beside it, because this package has metres.
+per second next to radians makes it eleven times that of metres. The claim is about feet, in which
+book and thesis print the aircraft; metres are given too, because this package has metres.
 """
 
 from __future__ import annotations

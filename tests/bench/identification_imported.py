@@ -1,5 +1,5 @@
-"""Imported virtual flights beside a plain least-squares pipeline, as open PX4 projects have it,
-and beside AeroID.
+"""Imported virtual flights against a plain least-squares pipeline, as open PX4 projects have it,
+and against AeroID.
 
     .venv/bin/python tests/bench/identification_imported.py --aeroid 3   # all flights, ten minutes
 
@@ -140,7 +140,7 @@ def main(arguments: list[str] | None = None) -> int:
         error = np.median([one for one, _ in rows]) if rows else float("nan")
         print(
             f"{name:22s} median error {100 * error:5.1f} %  held {sum(h for _, h in rows):3d} of"
-            f" {len(rows)} told of {asked[name]}  {np.median(seconds[name]):6.1f} s a flight"
+            f" {len(rows)} estimated of {asked[name]}  {np.median(seconds[name]):6.1f} s a flight"
         )
     return 0
 

@@ -64,7 +64,7 @@ def lsim_s(problem: OutputProblem, bound: Array) -> float:
 def aeroid_fit(problem: OutputProblem, theta: Array, bound: Array) -> tuple[float, float]:
     """Return the seconds of the AeroID package and its largest distance from ours in bounds.
 
-    It is told the noise (ours estimates it) and starts where ours does. It knows no free start
+    It is given the noise (ours estimates it) and starts where ours does. It knows no free start
     states, so they are parameters of a shift: x = x0 + xi, xi(0) = 0.
     """
     maneuver = problem.maneuvers[0]

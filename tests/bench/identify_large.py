@@ -1,4 +1,4 @@
-"""`host info` and `host identify` on 99 MiB of ULog: processor time and memory, and beside them
+"""`host info` and `host identify` on 99 MiB of ULog: processor time and memory, and next to them
 those of another worktree in the same run.
 
     .venv/bin/python tests/bench/identify_large.py --against ../other   # ten minutes

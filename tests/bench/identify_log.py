@@ -2,7 +2,7 @@
 
 The logs come from the recorder run on this computer over simulated flights; without `host
 simulate` and its library (`make sitl`) there is nothing to measure. Limits are held against
-processor time, as in the other benches: a busy machine does not count; wall time stands beside it.
+processor time, as in the other benches: a busy machine does not count; wall time is printed too.
 """
 
 import os
@@ -138,7 +138,7 @@ def imports_s() -> float:
 
 
 def report() -> bool:
-    """Print the figures beside their limits; return whether one is missed."""
+    """Print the figures and their limits; return whether one is missed."""
     imports_s()
     loading = statistics.median(imports_s() for _ in range(RUNS))
     print(f"imports of host identify: {loading:.2f} s processor (limit {IMPORT_LIMIT_S} s)")

@@ -1,4 +1,4 @@
-"""`make bench`: what damage costs and how fast a log becomes numbers, beside two peers.
+"""`make bench`: what damage costs and how fast a log becomes numbers, against two peers.
 
     python tests/bench/run.py            # both tables, about five minutes
     python tests/bench/run.py --large    # and the memory of converting a 2 GB log to Parquet

@@ -158,7 +158,7 @@ def test_files_are_told_apart(tmp_path: Path) -> None:
 
 
 def test_a_field_of_a_million_spaces_is_no_field() -> None:
-    """Two runs of optional spaces beside each other once took the square of their length."""
+    """Two runs of optional spaces next to each other once took the square of their length."""
     spaces = b"PCH" + b" " * 1_000_000 + b"x"
     rows = parse_rows(b"RLL:1.00,PCH:2.00,YAW:3.00,AN0:4.00\nRLL:1.00," + spaces + b",YAW:3.00\n")
     assert len(rows) == 1

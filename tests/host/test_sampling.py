@@ -36,7 +36,7 @@ def test_a_curve_is_drawn_over_no_gap_and_through_no_invalid_sample() -> None:
     values = np.sin(2.0 * np.pi * SHORT_PERIOD_HZ * sampled_s)
     values[60] = np.nan
     found = Interpolator(sampled_s * 1e6, rows_s * 1e6, 5e4)(values)
-    # Nothing over the gap, nothing beside the invalid sample, and all the rest stands.
+    # Nothing over the gap, nothing next to the invalid sample, and all the rest stands.
     assert np.flatnonzero(~np.isfinite(found)).tolist() == [39, 59, 60, len(rows_s) - 1]
     true = np.sin(2.0 * np.pi * SHORT_PERIOD_HZ * rows_s)
     assert np.nanmax(np.abs(found - true)) < 0.05

@@ -1,4 +1,4 @@
-"""Files of the user: what cannot be is refused by its name and range, what is odd is told."""
+"""Files of the user: what cannot be is refused by its name and range, what is odd is said."""
 
 import json
 import re

@@ -37,7 +37,7 @@ class Module:
 
     @cached_property
     def text(self) -> str:
-        """Return what stands in the file."""
+        """Return the text of the file."""
         return self.path.read_text(encoding="utf-8")
 
     @cached_property

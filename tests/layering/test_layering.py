@@ -35,7 +35,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*(<[^>]+>|"[^"]+"|\S+)', re.MULTILINE)
 
 # What the recording path does without: heap, virtual calls, exceptions, floats, the C++ library.
 BANNED = re.compile(r"\b(virtual|new|malloc|calloc|realloc|throw|float|double)\b|\bstd::")
-# Once a second, in slices, beside the recording path: the solve of the learning.
+# Once a second, in slices, off the recording path: the solve of the learning.
 WITH_FLOATS = Path("firmware/core/learning")
 COMMENT = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.DOTALL)
 
@@ -71,7 +71,7 @@ HOST_FLOORS: dict[str, tuple[str, ...]] = {
 # Of a function of `host.verbs`, in lines without its docstring; and what only work needs.
 VERB_BODY = 60
 COMPUTING = {"numpy", "pandas", "scipy", "numba", "matplotlib"}
-# Modules beside the rooms that start programs or give the package its names.
+# Modules outside the rooms that start programs or give the package its names.
 PROGRAMS = {"__init__", "__main__", "cli", "virtual"}
 # Whatever the order above: the virtual flight and identification meet in `planning` and in the
 # studies only, what is physics knows no test card.
@@ -165,7 +165,7 @@ def floor_breaches(root: Path) -> Iterator[str]:
         base = root / "host" / "src" / Path(*package.split("."))
         for path in _files(base, {".py"}):
             room = _room(path.relative_to(base))
-            # A module beside the rooms (errors, resources) is the ground they stand on, but for
+            # A module outside the rooms (errors, resources) is the ground they stand on, but for
             # those that start programs.
             floor = floors.index(room) + 1 if room in floors else 0
             above = set(floors[floor:]) if room not in PROGRAMS else set()

@@ -2,7 +2,7 @@
 
 universalmutator alters the source line by line. A mutant counts when it compiles and its object
 differs from the original's and from every other mutant's (-O2, no debug information): what the
-compiler finds the same cannot be told apart by any test. A header's object is that of its suites'
+compiler finds the same cannot be detected by any test. A header's object is that of its suites'
 files that include it, at -O0, for optimising them takes four times as long; only what lives is
 compared at -O2 too. A mutant is killed when a test case fails, the suite crashes or runs for twenty
 times its processor time, 0.3 s at least. What survives so is compared with the original's
@@ -195,7 +195,7 @@ class Judge:
         return found
 
     def _others(self) -> list[Path]:
-        """Return what the suites link beside the mutant, in an order of its own."""
+        """Return what the suites link besides the mutant, in an order of its own."""
         core = FIRMWARE / "core"
         others = set(core.rglob("*.cpp"))
         for path in self._of_suites:
@@ -310,7 +310,7 @@ class Judge:
         command = [COMPILER, *flags, "-c", str(source), "-o", str(target)]
         return subprocess.run(command, cwd=ROOT, capture_output=True, check=False).returncode == 0
 
-    # A mutant is a library of its own beside programs that stay: linking those takes ten times as
+    # A mutant is a library of its own next to programs that stay: linking those takes ten times as
     # long as compiling it.
     @staticmethod
     def _link(built: list[Path], folder: Path, flags: tuple[str, ...]) -> bool:
@@ -391,7 +391,7 @@ def _is_known(seen: dict[str, str], content: str, mutant: Mutant) -> bool:
 
 
 def _headers() -> bytes:
-    """Return what any object may be made of beside its own folder."""
+    """Return what any object may be made of besides its own folder."""
     places = (FIRMWARE, ROOT / "protocol" / "generated")
     found = [path for place in places for path in sorted(place.rglob("*.h"))]
     return b"".join(path.read_bytes() for path in [*found, *sorted(SUITES.glob("*.h"))])

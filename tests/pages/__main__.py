@@ -1,4 +1,4 @@
-"""Print words of pages by group beside their limits; `--fall` lowers these to today."""
+"""Print words of pages by group and their limits; `--fall` lowers these to today."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Print the count; 6 where a group is above its limit."""
     parser = argparse.ArgumentParser(prog="python -m tests.pages", description=__doc__)
     parser.add_argument("--pages", action="store_true", help="each page, longest first")
-    parser.add_argument("--fall", action="store_true", help="lower limits to what stands today")
+    parser.add_argument("--fall", action="store_true", help="lower limits to today's counts")
     chosen = parser.parse_args(arguments)
     counts = count_pages()
     if chosen.pages:

@@ -39,7 +39,7 @@ def group_of(page: str) -> str:
 
 
 def words_of(text: str) -> int:
-    """Count what stands between blanks and is no sign that draws a table, a list or a heading."""
+    """Count each text between blanks that is no sign that draws a table, a list or a heading."""
     return sum(bool(word.strip("|-:#*`")) for word in text.split())
 
 

@@ -1,4 +1,4 @@
-"""What forged logs cost: processor time and memory of hostile files beside a clean log's.
+"""What forged logs cost: processor time and memory of hostile files against a clean log's.
 
     python -m tests.protocol.costs --blocks 2000 32768
 
@@ -167,7 +167,7 @@ def measured(path: Path) -> tuple[float, int, str]:
 
 
 def compare(count: int, clean: Path, files: Iterable[tuple[str, bytes]]) -> tuple[list[str], float]:
-    """Print what files cost beside a clean one; return those that cost too much, most times."""
+    """Print what files cost against a clean one; return those that cost too much, most times."""
     clean_s, clean_bytes, end = measured(clean)
     print(
         f"{count:6d} blocks  {'clean':28s} {clean_s:7.3f} s {clean_bytes >> 20:5d} MiB"

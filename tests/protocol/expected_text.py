@@ -1,4 +1,4 @@
-"""A log as text: what stands beside each log of tests/data.
+"""A log as text: the text file of each log of tests/data.
 
 Every value of every frame, raw, so that a decoder of later years can be held to it without
 believing anything it derives from them.

@@ -1,4 +1,4 @@
-"""Forged logs: what stands in them is wrong, but every CRC is right.
+"""Forged logs: their content is wrong, but every CRC is right.
 
 A forgery is a function of a log's bytes and of a seeded generator, as a damage is (damage.py). It
 changes headers, frames or the schema; blocks are sealed again, and name the schema they then have.

@@ -328,7 +328,7 @@ class LogWriter:
     def truth(self, name: str) -> tuple[Rows, NDArray[np.int64]]:
         """Return every row of frame `name` in log order and the sequence of its block."""
         if self._truth is None:
-            raise TypeError("this writer was told not to keep the truth")
+            raise TypeError("this writer was set not to keep the truth")
         kept = self._truth[name]
         if not kept.rows:
             return np.zeros(0, self.layouts[name]), np.zeros(0, np.int64)

@@ -22,7 +22,7 @@ def test_a_log_and_a_file_of_rows_are_measured(tmp_path: Path) -> None:
 def test_a_reader_that_fails_is_no_cheap_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It took no time at all, and every hostile file passed beside it."""
+    """It took no time at all, and every hostile file passed against it."""
     monkeypatch.setattr(costs, "READ", "import host.no_such_module")
     with pytest.raises(SystemExit, match="was not measured: ModuleNotFoundError"):
         costs.measured(tmp_path / "flight.bin")

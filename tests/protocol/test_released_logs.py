@@ -1,4 +1,4 @@
-"""Logs of released formats decode for ever, to every value written beside them."""
+"""Logs of released formats decode for ever, to every value written with them."""
 
 from pathlib import Path
 

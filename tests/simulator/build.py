@@ -114,7 +114,7 @@ def build_program(name: str) -> Path:
 
 
 def main() -> int:
-    """Build the library and every program; print what stands."""
+    """Build the library and every program; print what is there."""
     try:
         print(build_library())
         for source in sorted((HERE / "programs").glob("*.c")):

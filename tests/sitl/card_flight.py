@@ -1,4 +1,4 @@
-"""Fly beside a card: ten seconds on the ground, then throttle up; the Mega drives from 2 s on."""
+"""Fly with a card: ten seconds on the ground, then throttle up; the Mega drives from 2 s on."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def fly(sitl: Sitl, card: SparseCard) -> Judgement:
 
 
 def stay(sitl: Sitl, card: SparseCard, seconds: float) -> list[str]:
-    """Stay on the ground beside a card, then cut the power; gives what was said each second."""
+    """Stay on the ground with a card, then cut the power; gives what was said each second."""
     sitl.insert_card(card.image, CARD_ID)
     still_aircraft.give(sitl, seconds + MARGIN_S, throttle_up_s=seconds + MARGIN_S)
     sitl.power_on()

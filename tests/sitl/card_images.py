@@ -1,4 +1,4 @@
-"""Fly beside cards drawn at random, altered from good ones, under sanitizers.
+"""Fly with cards drawn at random, altered from good ones, under sanitizers.
 
     make card-images                            10 000 cards
     make card-images IMAGES="--count 200"       a look
@@ -48,7 +48,7 @@ def build_sanitized() -> Path:
 
 
 def fly_all(first: int, count: int, library: Path) -> Iterator[Result]:
-    """Fly beside the cards of some seeds, one after the other."""
+    """Fly with the cards of some seeds, one after the other."""
     seed = first
     while seed < first + count:
         yield from (batch := _Batch(seed, first + count - seed, library))
@@ -56,7 +56,7 @@ def fly_all(first: int, count: int, library: Path) -> Iterator[Result]:
 
 
 class _Batch:
-    """One process that flies beside card after card until it is done or dies."""
+    """One process that flies with card after card until it is done or dies."""
 
     def __init__(self, seed: int, count: int, library: Path) -> None:
         self.next_seed = seed
@@ -112,7 +112,7 @@ class Kept:
                 self._results[result.seed] = result
 
     def fly_all(self, first: int, count: int, library: Path) -> Iterator[Result]:
-        """Give what is kept, fly beside the cards from the first on that is not."""
+        """Give what is kept, fly with the cards from the first on that is not."""
         seed = first
         while seed < first + count and seed in self._results:
             yield self._results[seed]
@@ -148,7 +148,7 @@ def _verdict(said: str) -> str:
 
 
 def work(seed: int, count: int, library: Path) -> None:
-    """Fly beside the cards of some seeds in this process, a line of JSON for each."""
+    """Fly with the cards of some seeds in this process, a line of JSON for each."""
     for number in range(seed, seed + count):
         drawn = draw(number)
         # CPU time, not the clock's: a loaded machine kills nothing.

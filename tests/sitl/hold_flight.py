@@ -92,7 +92,7 @@ class World:
     offset_rad : (3,) array
         Of the surfaces from the trim.
     bank_rad, pitch_rad : float
-        At launch, beside the trim's.
+        At launch, besides the trim's.
     seed : int
         Of the air.
     imu : callable

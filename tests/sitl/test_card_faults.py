@@ -1,4 +1,4 @@
-"""Cards that once kept the recorder from recording: each records in time, and its event is told."""
+"""Cards that once kept the recorder from recording: each records in time, and logs its event."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ KILOBYTES = (4, 32)
 
 
 def records(card: SparseCard, number: int = NUMBER + 1) -> None:
-    """Judge a flight beside the card: it is recorded, under the next number."""
+    """Judge a flight with the card: it is recorded, under the next number."""
     judgement = fly(Sitl(), card)
     assert (judgement.wrong, judgement.stage) == ([], Stage.RECORDING)
     assert look_at(card).flights[-1][0] == number

@@ -1,4 +1,4 @@
-"""A card that holds axes in the digital twin: the recorder beside the aircraft."""
+"""A card that holds axes in the digital twin: the recorder in one loop with the aircraft."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def bank_deg(record: FlightRecord) -> float:
     return float(np.degrees(np.sqrt(np.mean(phi**2))))
 
 
-@pytest.mark.costs(40, "three flights with the recorder beside them")
+@pytest.mark.costs(40, "three flights with the recorder in their loop")
 def test_a_card_that_holds_is_flown_in_one_loop(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -82,7 +82,7 @@ def test_a_card_that_holds_is_flown_in_one_loop(
     (row,) = flown_inputs(log)
     assert (row.axes, row.held, row.reason) == (("rudder",), ("aileron", "elevator"), "done")
 
-    # The IMU's packets beside the aircraft are those of the whole flight, to the bit.
+    # The IMU's packets in the loop are those of the whole flight, to the bit.
     assert loops[-1].packets == given.packets
     # Through the signals of that flight the recorder moves the servos as they were flown: turns
     # of its main loop may begin elsewhere, so a pulse may know a sample of the IMU more or less.

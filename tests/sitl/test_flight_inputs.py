@@ -84,7 +84,7 @@ def test_a_row_is_flown_as_written_and_the_log_tells_it(tmp_path: Path) -> None:
     assert b"".join(whole[n] for n in range(len(whole))) == data
     assert int(parts[-1]["part"]) == 3
     assert int(log.frames["input_config"][-1]["switch_armed_min_us"]) == 1850
-    # Surface by surface, beside what the servo pulses say of the sticks.
+    # Surface by surface, against what the servo pulses say of the sticks.
     ident = log.frames["ident"]
     at_ms = (ident["t_us"].astype(np.int64) - round(start_s * 1e6)) / 1000.0 - 200.0
     added = ident["servo_elevator"].astype(int) - ident["rc_elevator"].astype(int)

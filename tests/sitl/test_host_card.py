@@ -55,7 +55,7 @@ HOLD = {
 
 
 def test_a_card_that_holds_is_written_with_its_gains(bench: Bench, card: bytes) -> None:
-    """The largest there is beside it: 32 rows."""
+    """With the most rows there are: 32."""
     line = SitlLine(bench.sitl)
     console = CardConsole(line, line.now_s)
     name = read_card(card).head["aircraft"]

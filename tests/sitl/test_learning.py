@@ -1,4 +1,4 @@
-"""What the logger learns while it flies a row, beside the host's arithmetic in double precision."""
+"""What the logger learns while it flies a row, against the host's sums in double precision."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ def test_room_for_a_quarter_of_an_hour_is_taken_before_all_is_searched(gigabytes
 
 
 def watch(card: SparseCard, seconds: float) -> list[str]:
-    """Stay on the ground beside a card; gives what each status line says of it."""
+    """Stay on the ground with a card; gives what each status line says of it."""
     sitl = Sitl()
     sitl.insert_card(card.image, CARD_ID)
     still_aircraft.give(sitl, seconds + 4.0, throttle_up_s=seconds)

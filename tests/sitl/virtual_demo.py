@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return FAILED
     if not asked.no_open and "CI" not in os.environ and sys.stdout.isatty():
         webbrowser.open((ROOT / PAGE).as_uri())
-    print(f"Open {PAGE}: the answer, beside the truth that only the simulation knows.")
+    print(f"Open {PAGE}: the answer, and the truth that only the simulation knows.")
     return 0
 
 

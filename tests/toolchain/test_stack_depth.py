@@ -85,7 +85,7 @@ int main(void) {
 
 
 def build(folder: Path, *flags: str) -> Path:
-    """Compile the program for a Mega, with what the compiler says of its frames beside it."""
+    """Compile the program for a Mega, with what the compiler says of its frames with it."""
     source = folder / "program.c"
     source.write_text(SOURCE)
     elf = folder / "program.elf"

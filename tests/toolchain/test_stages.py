@@ -145,7 +145,7 @@ def test_an_unknown_stage_is_a_usage_error() -> None:
 def test_a_stage_waits_only_for_stages_before_it(
     runner: ModuleType, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What stands behind it would not be waited for, and could hold up the workers."""
+    """What comes behind it would not be waited for, and could hold up the workers."""
     monkeypatch.setattr(runner, "ROOT", ROOT)
     listed = [stage.name for stage in runner.stages()]
     assert len(set(listed)) == len(listed) > 15

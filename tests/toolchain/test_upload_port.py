@@ -1,4 +1,4 @@
-"""An upload without a board is told so at once, not after a minute of time-outs."""
+"""An upload without a board fails at once, not after a minute of time-outs."""
 
 from __future__ import annotations
 

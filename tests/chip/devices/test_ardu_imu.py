@@ -10,7 +10,7 @@ from devices.ardu_imu import ArduImu, ImuSample, MasterDeath
 from simavr_bench import cycles
 from simavr_bench.testing import MakeChip, run_until_value
 
-PACKET = struct.Struct("<4BIH12hH")  # typed by hand, to be told when the schema moves
+PACKET = struct.Struct("<4BIH12hH")  # typed by hand, to fail when the schema moves
 
 
 def test_imu_sends_sequenced_packets_with_crc(make_chip: MakeChip) -> None:

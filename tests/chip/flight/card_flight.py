@@ -1,4 +1,4 @@
-"""Fly the image beside a card drawn or damaged: the Mega drives while it mounts and prepares."""
+"""Fly the image with a card drawn or damaged: the Mega drives while it mounts and prepares."""
 
 from __future__ import annotations
 

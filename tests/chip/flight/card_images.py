@@ -1,4 +1,4 @@
-"""Fly the image beside cards drawn at random, altered from good ones, on the simulated chip.
+"""Fly the image with cards drawn at random, altered from good ones, on the simulated chip.
 
     make card-images CHIP_IMAGES="--count 200"
 

@@ -54,7 +54,7 @@ ALLOWED = (
 
 @dataclass(frozen=True, slots=True)
 class GroundWrites:
-    """A run on the ground beside an open flight.
+    """A run on the ground with an open flight.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ def copy_of(card: SparseCard) -> SparseCard:
 
 
 def write_on_the_ground(elf: Path, kilobytes: int, folder: Path) -> GroundWrites:
-    """Power on beside an open flight, throttle idle: it is closed, the next file prepared.
+    """Power on with an open flight, throttle idle: it is closed, the next file prepared.
 
     Raises
     ------

@@ -47,7 +47,7 @@ class RebootResult:
     Attributes
     ----------
     first_block_s, first_metadata_s : float
-        From power-on to the first write into the flight's file and beside it; nan: none.
+        From power-on to the first write into the flight's file and outside it; nan: none.
     wrong : list of str
         What is not as it must be.
     """

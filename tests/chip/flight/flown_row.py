@@ -72,7 +72,7 @@ class RowCard:
     Attributes
     ----------
     does : str
-        What the row does beside its shape.
+        What the row does besides its shape.
     row, data : bytes
         Its row, and the card.
     source : callable

@@ -24,7 +24,7 @@ STACK_LEFT_BYTES = 1200
 HEAP = re.compile(r"^(malloc|free|realloc|calloc|__malloc_\w+|__brkval|_Zn[wa]\w*|_Zd[la]\w*)$")
 FLOAT_TEXT = re.compile(r"^(vfprintf|vsnprintf|sprintf|printf|dtostre|dtostrf|__ftoa\w*|strtod)$")
 FLOAT_MATH = re.compile(r"^__(add|sub|mul|div|cmp|le|ge|float\w*|fix\w*)sf\w*$")
-# Who may reckon in floats: once a second, beside the recording path (core/learning).
+# Who may reckon in floats: once a second, off the recording path (core/learning).
 LEARNING = re.compile(r"EquationError|RowLearning|^__\w*sf\w*$|^__fp_\w+$|^(square|sqrt)\w*$")
 DIVISION = re.compile(r"__(u?div|u?mod)\w+")
 

@@ -1,4 +1,4 @@
-"""Test inputs on the chip: as commanded, given up in time, the recorder's figures beside them.
+"""Test inputs on the chip: as commanded, given up in time, the recorder's figures with them.
 
 One flight to the middle of an input; each fault begins there, in a child process.
 """

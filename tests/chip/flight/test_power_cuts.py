@@ -29,7 +29,7 @@ def flight(flight_elf: Path, tmp_path_factory: pytest.TempPathFactory) -> Flight
 
 @pytest.fixture(scope="module")
 def ground(flight_elf: Path, tmp_path_factory: pytest.TempPathFactory) -> GroundWrites:
-    """What is written on the ground beside an open flight, clusters of 64 kB."""
+    """What is written on the ground with an open flight, clusters of 64 kB."""
     from flight.cut_boots import write_on_the_ground
 
     return write_on_the_ground(flight_elf, 64, tmp_path_factory.mktemp("ground"))

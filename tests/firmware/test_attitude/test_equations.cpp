@@ -1,4 +1,4 @@
-// The filter beside its equations in floating point, step by step, through random motion.
+// The filter against its equations in floating point, step by step, through random motion.
 #ifndef __AVR__
 
 #include <math.h>

@@ -1,4 +1,4 @@
-// The fixed-point functions over all that they take, beside floating point.
+// The fixed-point functions over all that they take, against floating point.
 #ifndef __AVR__
 
 #include <math.h>

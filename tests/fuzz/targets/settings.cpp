@@ -85,7 +85,7 @@ void session_slots(Feed& feed) {
     store.slot(i, slots[i]);
   }
   if (worn_out) return;
-  // Written and read back: the numbers given are the latest, whatever stands beside them.
+  // Written and read back: the numbers given are the latest, whatever is next to them.
   const core::SessionRecord given = {feed.u32(), feed.u32()};
   uint8_t bytes[core::kSessionSlotSize];
   const uint8_t slot = store.next(given, bytes);

@@ -1,4 +1,4 @@
-"""Derivatives where a maneuver was flown, beside the equations of motion integrated as they are."""
+"""Derivatives where a maneuver was flown, against equations of motion integrated as they are."""
 
 import numpy as np
 import pytest
@@ -44,7 +44,7 @@ def with_the_rotor(frame: Airframe, trim: Trim) -> list[complex]:
 
 
 def test_the_phugoid_is_damped_as_the_aircraft_with_its_rotor_is() -> None:
-    """A rotor that was held at its speed told 0.42 for 0.21."""
+    """A rotor that was held at its speed gave 0.42 for 0.21."""
     frame, trim, at = trimmed()
     [true] = [s for s in with_the_rotor(frame, trim) if 0.0 < s.imag < 2.0]
     held = {m.name: m for m in modes(linearise(frame, trim))}["phugoid"]

@@ -1,4 +1,4 @@
-"""A prior from TOML, AVL or Datcom stands beside the answer, in our axes at the flight's alpha.
+"""A prior from TOML, AVL or Datcom is compared with the answer, in our axes at the flight's alpha.
 
 The layouts are those of the programs; numbers and aircraft are made up.
 """

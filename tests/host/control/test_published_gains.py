@@ -1,7 +1,7 @@
 """The gains that the University of Minnesota flew on the Ultra Stick 25e, on its published model.
 
 OpenFlight's heading_tracker.c at 50 Hz; servo of 6 Hz, 50 ms and 20 ms of delay
-(OpenFlightAnalysis, US25e_Lin.py). Margins of the same loops computed beside it with every other
+(OpenFlightAnalysis, US25e_Lin.py). Margins of the same loops computed here with every other
 loop closed: aileron 6.8 rad/s, 63 degrees, 6.4 dB, disk 0.65; elevator 4.6, 84, 6.0, 0.63.
 """
 

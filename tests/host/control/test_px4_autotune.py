@@ -1,4 +1,4 @@
-"""PX4's autotune rule, as the bench flies it beside ours."""
+"""PX4's autotune rule, as the bench flies it against ours."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def test_draws_have_the_covariance_that_was_given() -> None:
     assert np.cov(drawn.T) == pytest.approx(axis.covariance, abs=0.03 * axis.covariance.max())
 
 
-@pytest.mark.costs(20, "a design verified on 135 aircraft, and a search beside it")
+@pytest.mark.costs(20, "a design verified on 135 aircraft, and a second search")
 def test_less_knowledge_gives_softer_gains_and_what_is_found_holds() -> None:
     known, vague = problem(0.02), problem(0.5)
     found = design(known)

@@ -1,4 +1,4 @@
-"""What a child does in tests in place of identification, told by the name of its source."""
+"""What a child does in tests in place of identification, chosen by the name of its source."""
 
 import os
 import time

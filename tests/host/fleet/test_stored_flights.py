@@ -39,7 +39,7 @@ class Twice:
 
 
 def said(words: list[str]) -> tuple[str, str]:
-    """Run the verb; return what it printed and what it told."""
+    """Run the verb; return what it printed and what it said."""
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         assert main(words) == 0

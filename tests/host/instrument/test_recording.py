@@ -35,7 +35,7 @@ Intervals = dict[str, tuple[float, float]]
 
 @pytest.fixture(scope="module")
 def flown() -> VirtualFlight:
-    """A flight whose table has the pots, and the commands beside them."""
+    """A flight whose table has the pots, and the commands too."""
     return virtual_flight(STRAIGHT_ON, 41, chain="none")
 
 

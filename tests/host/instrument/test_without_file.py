@@ -108,7 +108,7 @@ def test_a_record_tells_the_zero_of_a_vane_where_its_model_has_none(
 
 @pytest.fixture(scope="module")
 def answers() -> tuple[Answer, Answer]:
-    """The same record of perfect sensors, told to be such, and of sensors nobody knows."""
+    """The same record of perfect sensors, known to be such, and of sensors nobody knows."""
     flight = fly("short-period", "none", "white", 1)
     told, unknown = (
         identify(

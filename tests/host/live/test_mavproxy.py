@@ -1,4 +1,4 @@
-"""MAVProxy, a ground station that is not ours, beside `host live --mavlink`."""
+"""MAVProxy, a ground station that is not ours, under `host live --mavlink`."""
 
 import contextlib
 import os

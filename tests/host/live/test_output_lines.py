@@ -15,7 +15,7 @@ LINE = "x" * 1000
 def test_a_reader_that_rests_holds_nothing_up(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """Ten times what a pipe and the memory hold: the giver returns; the count is told."""
+    """Ten times what a pipe and the memory hold: the giver returns; the count is said."""
     read_fd, write_fd = os.pipe()
     told = tmp_path / "err"
     with os.fdopen(write_fd, "w") as pipe, told.open("w") as err:

@@ -91,7 +91,7 @@ ESTIMATES = """(async () => {
 })()"""
 
 
-# What the logger learns: no card, a card, a row that teaches, the same told no more.
+# What the logger learns: no card, a card, a row that teaches, the same sent no more.
 LEARNING = """(async () => {
   const { showLearning } = await import("./learning.js");
   const box = document.getElementById("logger-box");
@@ -147,7 +147,7 @@ HORIZON = """(async () => {
 })()"""
 
 
-# A tile lies where its corner is: that of home below home, its neighbour in the east beside it.
+# A tile lies where its corner is: that of home below home, its neighbour in the east next to it.
 TILES = """(async () => {
   const { Tiles, tileOf } = await import("./tiles.js");
   const [column, row] = tileOf(51.5, -0.1, 10).map(Math.floor);

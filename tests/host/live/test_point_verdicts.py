@@ -279,9 +279,9 @@ def test_the_promise_tells_the_noise_of_calm_air_and_the_rows_that_of_gusts(card
     neither = replace(both, measured={}, expected={})
     assert score(both) == score(estimate_of(wanted, 9.0, 1.0))
     assert score(both, 2.0) == score(estimate_of(wanted, 1.5, 9.0), 2.0)
-    # A fit that ran away told a twentieth of the promised half-width.
+    # A fit that ran away gave a twentieth of the promised half-width.
     assert score(neither) == score(estimate_of(wanted, 1.5, 0.05))
-    # The movement counts beside each, and alone where rows were too few for it.
+    # The movement counts with each, and alone where rows were too few for it.
     assert score(neither) < score(both) < 100
     assert score(neither) == score(replace(both, expected={}))
     assert score(neither, 2.0) == score(replace(both, measured={}), 2.0) < score(neither)

@@ -1,4 +1,4 @@
-"""Every byte is on disk whatever shows, judges, asks or hangs beside the recorder."""
+"""Every byte is on disk whatever shows, judges, asks or hangs next to the recorder."""
 
 import asyncio
 import contextlib
@@ -54,7 +54,7 @@ class Radio:
 
 
 class Flight:
-    """A session on a radio, and what its terminal was told."""
+    """A session on a radio, and what its terminal showed."""
 
     def __init__(self, folder: Path) -> None:
         self.radio = Radio()

@@ -1,4 +1,4 @@
-"""What the logger is told of an axis: known sensors give a known motion's coefficients back."""
+"""What the logger is given of an axis: known sensors give a known motion's coefficients back."""
 
 from __future__ import annotations
 

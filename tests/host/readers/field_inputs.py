@@ -138,7 +138,7 @@ def glued_rows(path: Path) -> Path:
 
 
 def micros_wrap(path: Path) -> Path:
-    """Write 32-bit microseconds that begin again, and the map beside them."""
+    """Write 32-bit microseconds that begin again, and the map with them."""
     rows = logs.table()
     us = (np.round(rows["t_s"] * 1e6).astype(np.int64) + 2**32 - 8_000_000) % 2**32
     names = [name for name in rows if name != "t_s"]

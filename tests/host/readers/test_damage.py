@@ -33,7 +33,7 @@ def attempt(path: Path, data: bytes) -> tuple[str, float]:
 
 @pytest.mark.parametrize("kind", FORMATS)
 def test_a_log_cut_anywhere(kind: str, tmp_path: Path) -> None:
-    """It is said, and what stands before the cut is read."""
+    """It is said, and the part before the cut is read."""
     whole = write(kind, tmp_path)
     data = whole.read_bytes()
     _, full_s = attempt(whole, data)

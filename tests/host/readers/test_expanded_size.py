@@ -1,4 +1,4 @@
-"""What a table expands to is asked before it is made; what pandas wrote beside it is not read."""
+"""What a table expands to is asked before it is made; what pandas wrote besides is not read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables of self-made loggers: a line that is no row costs itself alone, and is told."""
+"""Tables of self-made loggers: a line that is no row costs itself alone, and is said."""
 
 from __future__ import annotations
 

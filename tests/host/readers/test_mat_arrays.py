@@ -1,4 +1,4 @@
-"""Our reader of MAT files beside scipy's, value for value, and files that mean harm."""
+"""Our reader of MAT files against scipy's, value for value, and files that mean harm."""
 
 from __future__ import annotations
 

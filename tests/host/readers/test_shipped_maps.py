@@ -98,7 +98,7 @@ def test_a_layout_reads_back_as_the_flight(name, write, ending, flown, tmp_path)
 
 
 def test_a_map_of_mine_begins_with_a_shipped_one(flown, tmp_path) -> None:  # type: ignore[no-untyped-def]
-    """Own lines beside the base's; what the base names and the data lack is said, not refused."""
+    """Own lines next to the base's; what the base names and the data lack is said, not refused."""
     own, table = flown
     path, mine = tmp_path / "log.csv", tmp_path / "mine.toml"
     _inav(table, path)

@@ -26,7 +26,7 @@ def test_test_points_are_those_of_host_maneuvers(
 
 
 def test_of_original_rows_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Their vanes drop out: `host maneuvers` divides what stands over it, the page did not."""
+    """Their vanes drop out: a column that stands still is missing, as in `host maneuvers`."""
     asked = ("--firmware", "thesis", "--seed", "31005", "--no-picture", "-o", str(tmp_path))
     assert main(["simulate", "thesis_flight1", *asked]) == 0
     rows = tmp_path / "flight.thesis.txt"

@@ -45,7 +45,7 @@ def test_reckoning_finds_the_gust_but_for_a_wind_over_the_ground() -> None:
     left = wind - gust
     constant = np.linalg.lstsq(steady.reshape(-1, 3), left.ravel(), rcond=None)[0]
     np.testing.assert_allclose(left, steady @ constant, atol=2e-3)
-    assert np.std(left) > 0.1  # and that wind is really not told
+    assert np.std(left) > 0.1  # and that wind is really not known
     np.testing.assert_allclose(steady[:, :, 1], _turned(rates, np.eye(3)[1]), atol=2e-3)
 
 

@@ -1,4 +1,4 @@
-"""The table of rows that hold beside rows that do not: pairs, refusals and signs."""
+"""The table of rows that hold against rows that do not: pairs, refusals and signs."""
 
 from __future__ import annotations
 

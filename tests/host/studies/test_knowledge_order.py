@@ -7,7 +7,7 @@ from studies.judgement.knowledge_order import MEDIAN, TENTH, flown, ratios
 @pytest.mark.costs(20, "a flight of the recorder, identified by both models three times")
 def test_without_a_vane_or_the_aircraft_file_no_interval_is_narrower() -> None:
     """One vane alone takes no part in the reconstruction; its scale was in no interval then, and
-    Z_alpha without the other vane known to 0.89 of what both told."""
+    Z_alpha without the other vane known to 0.89 of what both gave."""
     for less, own in ratios(flown(1), ("beta vane", "aircraft file")).items():
         assert min(own.values()) > TENTH, (less, own)
         assert sorted(own.values())[len(own) // 2] > MEDIAN, (less, own)

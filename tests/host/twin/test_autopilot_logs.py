@@ -1,4 +1,4 @@
-"""`host simulate --to`: the same flight as other autopilots had logged it, beside our own log."""
+"""`host simulate --to`: the same flight as other autopilots had logged it, and our own log."""
 
 from __future__ import annotations
 

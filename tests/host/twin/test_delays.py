@@ -107,7 +107,7 @@ def behind(record: FlightRecord, signals: Array, response: Callable[[Array], Res
 def left_over_s(t_s: Array, expected: Array, at_s: Array, measured: Array, column: int) -> float:
     """Return by how much `measured` is later than `expected` (n, k)[:, column].
 
-    Scale, zero, drift and the other columns' share of it (misalignment) are fitted beside.
+    Scale, zero, drift and the other columns' share of it (misalignment) are fitted too.
     """
     inside = (at_s > 8.0) & (at_s < t_s[-1] - 2.5) & np.isfinite(measured)
     at = at_s[inside]

@@ -185,7 +185,7 @@ def all_channels_lost(f: Flown, calm: Flown) -> None:
     assert gone - AT_S < 0.1
     assert all(f.ident[name][f.during].max() == 0 for name in RC)
     assert NO_DRIVE["direct_receiver_lost"] in f.told("drive_changed")
-    # The aircraft felt it: the motor runs down.
+    # It acts on the aircraft: the motor runs down.
     later = f.record.t_s > AT_S + 1.5
     assert f.record.thrust_n[later].min() < 0.2 * calm.record.thrust_n[later].min()
 

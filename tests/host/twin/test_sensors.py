@@ -179,7 +179,7 @@ def test_accelerometer_off_the_cg_feels_the_angular_motion(
     pitch = np.interp(at, perfect.t_s, perfect.angular_acceleration_radps2[:, 1])
     assert np.abs(pitch).max() > 3.0
     difference = moved.force_mps2 - centre.force_mps2
-    # a_z gains -q' x, a_x gains q' z; rates squared are small beside them here.
+    # a_z gains -q' x, a_x gains q' z; rates squared are small against them here.
     assert np.abs(difference[:, 2] + pitch * x).max() < 0.08
     assert np.abs(difference[:, 0] - pitch * z).max() < 0.08
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOM = Path(__file__).resolve().parents[1]
 if str(ROOM) not in sys.path:
-    sys.path.insert(0, str(ROOM))  # the package lies beside its tests, not in the host's wheel
+    sys.path.insert(0, str(ROOM))  # the package lies next to its tests, not in the host's wheel
 
 from simavr_bench.fixtures import build, make_chip  # noqa: E402
 

@@ -103,7 +103,7 @@ def test_master_reads_registers_behind_a_repeated_start(master: tuple[Chip, I2cB
     chip.power_on()
     chip.run_s(0.01)
     assert statuses(chip) == ACK_LINE
-    assert sensor.count == 0  # a magnetometer that was told nothing stands still
+    assert sensor.count == 0  # a magnetometer that got no command stands still
     starts = chip.records(LogKind.TWI, TwiNote.START)["cycle"]
     assert len(starts) == 2
     # SLA+W and a register number, then the repeated START: nineteen bits and what the program takes

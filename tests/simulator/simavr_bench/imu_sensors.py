@@ -126,7 +126,7 @@ class Mpu6000:
         self._lib.bench_mpu_write(self._mpu, number, value)
 
     def samples(self) -> Samples:
-        """Every sample so far that was told by the data-ready line.
+        """Every sample so far that was announced by the data-ready line.
 
         Returns
         -------

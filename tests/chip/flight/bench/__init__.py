@@ -2,7 +2,7 @@
 
 ``make flight-bench`` flies ten simulated minutes at 100 Hz and at 200 Hz, through all eight
 receivers of :mod:`flight.bench.plan`, then a row of a flight card that teaches an axis
-(:mod:`flight.bench.inputs`), and prints every figure beside its limit.
+(:mod:`flight.bench.inputs`), and prints every figure with its limit.
 
 Simulation only: cycles and bytes are those of the image, times those of the device models.
 """

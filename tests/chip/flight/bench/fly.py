@@ -229,7 +229,7 @@ def _drive_inputs(
     for slot in range(FIELDS):
         profile = ramp(begin, end, slot) if slot in RAMP_SLOTS else steps(begin, end, rng)
         channel = ANALOG_CHANNELS[slot]
-        chip.analog(channel, 1.0)  # without noise: what is put in can be told to a count
+        chip.analog(channel, 1.0)  # without noise: what is put in is known to a count
         chip.analog_profile(channel, profile.cycles, profile.volts)
         profiles.append(profile)
     return tuple(profiles)

@@ -34,7 +34,7 @@ ROW_S = 12.0
 SEED = 31_300
 CARD = "inputs.img"
 QUIET_S = 0.2
-BEHIND_S = 2.5  # the last second's estimates are told, the last block is written
+BEHIND_S = 2.5  # the last second's estimates are sent, the last block is written
 SURFACES = 3
 CYCLES_PER_US, TICKS_PER_US = CYCLES_PER_S // 1_000_000, 2
 PAINTED_S, RAM_END = 0.03, 0x2200
@@ -80,7 +80,7 @@ class InputFigures:
     held : bool
         Whether the row held bank and pitch, in place of teaching.
     told : int
-        Derivatives that were told by radio.
+        Derivatives that were sent by radio.
     untouched_bytes : int
         Of the stack, since power-on.
     frames_lost, stalls : int
@@ -105,7 +105,7 @@ class InputFigures:
 class CommandWatch:
     """Compares each surface pulse on the pins with the width that the firmware asked for.
 
-    The timers take up a width as a pulse begins: what stands in the firmware's memory at that
+    The timers take up a width as a pulse begins: what is in the firmware's memory at that
     instant is the command. One that is on its way from there into the timer's register as the
     pulse begins is the next pulse's: then the one that stood there 20 us ago is this one's.
 

@@ -102,7 +102,7 @@ def stalls(rate_hz: int, begin: int, end: int, rng: np.random.Generator) -> list
 
 
 class Sticks:
-    """Sticks that never rest: sines, and each pulse up to 40 us beside them.
+    """Sticks that never rest: sines, and each pulse up to 40 us off them.
 
     So that each pulse tells by its width which one it is.
     """

@@ -1,4 +1,4 @@
-"""Print what was measured beside what is asked for."""
+"""Print what was measured and what is asked for."""
 
 from __future__ import annotations
 

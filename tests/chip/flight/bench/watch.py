@@ -88,7 +88,7 @@ class ReceiverWatch:
             first = channel * self._stride
             rise = memory[first + self._rise : first + self._rise + 4]
             if rise != self._last[channel]:
-                # Perhaps half written: what stands there at the next look counts.
+                # Perhaps half written: its content at the next look counts.
                 self._last[channel] = rise
                 self._changed[channel] = True
             elif self._changed[channel]:

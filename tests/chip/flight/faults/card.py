@@ -26,7 +26,7 @@ def stall_is_told(seen: Seen) -> Sequence[str]:
     busiest = int(seen.system["card_busy_max_ms"].max())
     return [
         *turns(seen),
-        *expect(len(told) == 1 and abs(told[0] - busiest) <= 10, f"stalls told: {told} ms"),
+        *expect(len(told) == 1 and abs(told[0] - busiest) <= 10, f"stalls reported: {told} ms"),
         *expect(busiest >= 495, f"longest busy time logged {busiest} ms"),
     ]
 
@@ -40,7 +40,7 @@ def drops_are_counted(seen: Seen) -> Sequence[str]:
     missing = int(gaps.sum())
     return [
         *turns(seen),
-        *expect(told == counted == seen.log.loss.dropped_frames, f"{told} told, {counted} counted"),
+        *expect(told == counted == seen.log.loss.dropped_frames, f"{told} said, {counted} counted"),
         *expect(0 < missing == seen.log.loss.frames, f"{missing} identification frames missing"),
         *expect(np.count_nonzero(gaps) == 1, "dropped in several pieces, not the newest in one"),
     ]
@@ -52,7 +52,7 @@ def removal_is_told(seen: Seen) -> Sequence[str]:
     late_s = (told[0].t_us - seen.begin / 16) / 1e6 if told else float("nan")
     return [
         *turns(seen),
-        *expect(late_s < 1.0, f"told {late_s:.2f} s after the removal"),
+        *expect(late_s < 1.0, f"reported {late_s:.2f} s after the removal"),
         *expect(not seen.events_of("reset"), "the chip was reset"),
         *expect(len(seen.rig.started) == 1, "the chip started anew"),
     ]
@@ -122,7 +122,7 @@ CARD = (
     Fault("2", "card's line low for 4 s", "stops with alarm, resumes",
           hold_line_between_blocks, lambda r: r.card.hold_line(False), lossless=False,
           check=stopped_and_resumed, fault_s=4.0, after_s=5.0),
-    Fault("3", "card pulled, put back", "told in 1 s, resumes", lambda r: r.card.remove(),
+    Fault("3", "card pulled, put back", "reported in 1 s, resumes", lambda r: r.card.remove(),
           lambda r: r.card.insert(), events=("card_removed",), lossless=False, after_s=4.0,
           check=removal_is_told),
     Fault("3", "card pulled for good", "alarm, telemetry goes on", remove_for_good,

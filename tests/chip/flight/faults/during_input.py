@@ -1,6 +1,6 @@
 """The faults again, while the logger flies an input of a card and learns from it.
 
-A row is judged as without an input. Beside that: no servo pulse that is neither the pilot's nor the
+A row is judged as without an input. Besides: no servo pulse that is neither the pilot's nor the
 card's, the travel that the pilot showed never left, plain pulses within the limit where the fault
 must end an input, none behind `input_end`, none after a reset.
 """
@@ -116,6 +116,6 @@ def how_it_ended(seen: Seen, row: FlownRow) -> str:
     """Return why, by the log, and when the last deflected pulse began."""
     names = {value: name for name, value in packed_schema().enums["input_end"].items()}
     ends = seen.events_of("input_end")
-    why = names.get(ends[0].arg >> 8 & 255, "?") if ends else "no end told"
+    why = names.get(ends[0].arg >> 8 & 255, "?") if ends else "no end reported"
     last_ms = (deflected(seen.rig, row).max(initial=0) - seen.begin) / 16e3
     return f"{why}, last {last_ms:.0f} ms behind"

@@ -15,7 +15,7 @@ EVERY_SETTING = tuple(range(64))
 SPCR = 0x4C
 BABBLE_S = 0.5
 BABBLE_TURN_US = 4000
-MEASURED_S = 2.5  # the supply, once in 128 frames, and told once a second
+MEASURED_S = 2.5  # the supply, once in 128 frames, and sent once a second
 PERIOD_US = 10_000  # of the identification frame
 
 
@@ -29,7 +29,7 @@ def supply_is_unknown(seen: Seen) -> Sequence[str]:
     back = rows["avcc_mv"][time_us > seen.end // 16 + settled_us]
     return [
         *turns(seen),
-        *expect(len(late) and not np.any(late), f"supply told: {late} mV"),
+        *expect(len(late) and not np.any(late), f"supply reported: {late} mV"),
         *expect(len(back) and np.all(np.abs(back.astype(int) - 5000) < 60), f"later {back} mV"),
         *expect(not seen.events_of("drive_changed"), "the relay moved"),
     ]
@@ -71,7 +71,7 @@ def babble_costs_itself(seen: Seen) -> Sequence[str]:
 PERIPHERALS = (
     Fault("11", "IMU bus babbles for 0.5 s", "loop goes on", babble,
           check=babble_costs_itself),
-    Fault("4", "SPI switched off in its register", "told in 1 s, resumes",
+    Fault("4", "SPI switched off in its register", "reported in 1 s, resumes",
           lambda r: r.chip.poke(SPCR, b"\0"), events=("card_removed",), lossless=False,
           after_s=4.0, check=removal_is_told),
     Fault("19", "supply's conversion never ends", "unknown, the relay stays",

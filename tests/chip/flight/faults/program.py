@@ -77,14 +77,14 @@ def _movable(word: bytes) -> bool:
 
 
 def came_back(cause: str, *, where: str = "") -> Check:
-    """Make a check: relay released, cause told, recording again within 2 s, in a new session."""
+    """Make a check: relay released, cause said, recording again within 2 s, in a new session."""
 
     def check(seen: Seen) -> Sequence[str]:
         told = [event.arg for event in seen.events_of("reset")]
         rows = seen.log.frames["identity"]
         sessions = len(seen.log.sessions)
         wrong = [
-            *expect(told == [CAUSES[cause]], f"reset causes told: {told}"),
+            *expect(told == [CAUSES[cause]], f"reset causes reported: {told}"),
             *expect(released_ms(seen.rig, seen.begin) <= RELEASED_MS, "released late"),
             *expect(sessions == 2 and rows["resumed"][-1] == 1, f"{sessions} sessions"),
             *expect(rows["reset_cause"][-1] == CAUSES[cause], "another cause in the identity"),
@@ -94,7 +94,7 @@ def came_back(cause: str, *, where: str = "") -> Check:
             start, size = seen.rig.chip.symbols[where]
             at = [event.arg for event in seen.events_of("crash")]
             inside = len(at) == 1 and start <= at[0] < start + size
-            wrong += expect(inside, f"crash told at {[hex(a) for a in at]}")
+            wrong += expect(inside, f"crash reported at {[hex(a) for a in at]}")
         return wrong
 
     return check

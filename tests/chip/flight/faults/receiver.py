@@ -32,32 +32,32 @@ def channel_lost(number: int) -> Check:
                 wrong += expect(np.all(width > 0), f"{name} is missing")
         lost = seen.events_of("receiver_lost")
         bits = [event.arg for event in lost]
-        return [*wrong, *expect(bits == [1 << number], f"told as lost: {bits}")]
+        return [*wrong, *expect(bits == [1 << number], f"reported as lost: {bits}")]
 
     return check
 
 
 def all_lost(seen: Seen) -> Sequence[str]:
-    """Told within 100 ms, no pulse made up, none of 544 us."""
+    """Reported within 100 ms, no pulse made up, none of 544 us."""
     last = max(end for _, _, end in seen.rig.receiver.sent if end < seen.begin + cycles(0.03))
     lost = seen.events_of("receiver_lost")
     late_ms = (lost[0].t_us - last / 16) / 1000 if lost else float("nan")
     rows = seen.during(late_s=0.12)
     servos = [rows[f"servo_{name}"] for name in CHANNELS[:4]]
     return [
-        *expect(late_ms <= LOST_MS, f"told after {late_ms:.0f} ms"),
+        *expect(late_ms <= LOST_MS, f"reported after {late_ms:.0f} ms"),
         *expect(not np.any(np.stack(servos)), "pulses are sent without a receiver"),
     ]
 
 
 def failsafe_is_known(seen: Seen) -> Sequence[str]:
-    """The receiver's own failsafe is told from a switch that was moved."""
+    """The receiver's own failsafe is distinguished from a switch that was moved."""
     drives = [event.arg for event in seen.events_of("drive_changed")]
-    return expect(drives[:1] == [3], f"drive states told: {drives}")  # direct_receiver_lost
+    return expect(drives[:1] == [3], f"drive states reported: {drives}")  # direct_receiver_lost
 
 
 def glitches(rig: FlightRig) -> None:
-    """Add short pulses to three channels, some inside, some beside the true ones."""
+    """Add short pulses to three channels, some inside, some outside the true ones."""
     rng = np.random.default_rng(3)
     for _ in range(60):
         at = rig.chip.cycle + int(rng.integers(round(3.0 * 16e6)))
@@ -95,7 +95,7 @@ def noise_is_rejected(seen: Seen) -> Sequence[str]:
 
 
 def storm_is_bounded(seen: Seen) -> Sequence[str]:
-    """Told, masked: the main loop and everything else go on."""
+    """Reported, masked: the main loop and everything else go on."""
     return [
         *expect(seen.events_of("receiver_storm"), "no event receiver_storm"),
         *expect(int(seen.system["cpu_load"].max()) < 700, "the storm took the chip"),
@@ -130,7 +130,7 @@ def sag_is_logged(seen: Seen) -> Sequence[str]:
     return [
         *wrong,
         *expect(abs(int(avcc.min()) - 4400) < 60, f"lowest rail logged {avcc.min()} mV"),
-        *expect(4 in drives, f"drive states told: {drives}"),  # direct_self_test
+        *expect(4 in drives, f"drive states reported: {drives}"),  # direct_self_test
     ]
 
 

@@ -38,7 +38,7 @@ def run_fault(
 ) -> Outcome:
     """Fly on from the state of the rig with a fault; only in a child of in_fork.
 
-    With the row of a card that is being flown, its input is judged beside.
+    With the row of a card that is being flown, its input is judged too.
     """
     import host
 

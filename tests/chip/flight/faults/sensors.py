@@ -115,10 +115,10 @@ def slow_packets(seen: Seen) -> Sequence[str]:
 
 
 def restart_is_told(seen: Seen) -> Sequence[str]:
-    """Told once, its numbers are not a gap, values as sent: nothing is zeroed anew."""
+    """Reported once, its numbers are not a gap, values as sent: nothing is zeroed anew."""
     return [
         *no_bad_sample(seen),
-        *expect(len(seen.events_of("imu_restarted")) == 1, "not told once"),
+        *expect(len(seen.events_of("imu_restarted")) == 1, "not reported once"),
         *expect(seen.count("imu_lost") == 0, f"{seen.count('imu_lost')} counted as lost"),
     ]
 
@@ -288,7 +288,7 @@ def week_turns(seen: Seen) -> Sequence[str]:
         *expect(np.count_nonzero(np.diff(itow) < 0) == 1, "the time of week did not start over"),
         *expect(np.all(steps == 200), f"steps of {np.unique(steps)} ms"),
         *expect(np.all(np.diff(table["t_s"]) > 0), "the table's time does not rise"),
-        *expect(not seen.events_of("gps_lost"), "told as lost"),
+        *expect(not seen.events_of("gps_lost"), "reported as lost"),
     ]
 
 
@@ -331,7 +331,7 @@ IMU = (
           lambda r: change(r.imu, repeat_fraction=0.0), check=numbers_are_counted),
     Fault("12", "IMU slow: 40 Hz", "fresh rows marked",
           lambda r: pace(r, 40.0), lambda r: pace(r, 100.0), check=slow_packets),
-    Fault("13", "IMU reset in flight", "told, not zeroed anew", lambda r: r.imu.restart(0.3),
+    Fault("13", "IMU reset in flight", "reported, not zeroed anew", lambda r: r.imu.restart(0.3),
           check=restart_is_told),
     Fault("14", "gyro saturated", "marked row by row", saturate, unsaturate,
           check=saturation_is_marked),

@@ -134,7 +134,7 @@ STRANGE_CARDS = (
 
 
 def fly_strange(elf: Path, folder: Path, row: StrangeCard) -> CardFlight:
-    """Fly beside the card of a row."""
+    """Fly with the card of a row."""
     seen = in_fork(partial(fly_beside, elf, row.make(), folder, prepare=row.prepare))
     wrong = seen.judgement.wrong
     if not seen.judgement.message.startswith(row.message):
