@@ -83,6 +83,31 @@ def test_two_signals_are_named() -> None:
     assert "N_dr, N_r and N_p are not separable" in found.text
 
 
+def sines(highest_hz: float, rng: np.random.Generator) -> np.ndarray:
+    hz = np.arange(0.1, highest_hz, 0.1)
+    phase = rng.uniform(0.0, 2.0 * np.pi, len(hz))
+    waves = np.sin(2.0 * np.pi * hz * DT_S * np.arange(SAMPLES)[:, None] + phase)
+    return np.asarray(0.05 * waves.sum(axis=1) / np.sqrt(len(hz)))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(
+    "law",
+    [
+        Law("rudder_rad", {"r_radps": 0.4, "p_radps": 0.09}, 0.06, washout_s=3.0),
+        Law("rudder_rad", {"r_radps": 0.56}, 0.08, 0.25, 0.4),
+    ],
+)
+def test_a_filter_between_those_that_are_tried_names_no_signal_too_many(
+    law: Law, seed: int
+) -> None:
+    """What a filter next to the true one left, side-slip explained."""
+    inputs = {"aileron_rad": sines(3.0, np.random.default_rng(seed))}
+    [found] = found_in(flown("lateral", inputs, law, seed))
+    assert found.feedback is not None
+    assert set(found.feedback.signals) == set(law.gains)
+
+
 def test_a_bank_loop_takes_nothing() -> None:
     """Bank turns gravity only, so what follows it tells derivatives as a pilot's input does."""
     steps = np.repeat(np.random.default_rng(17718).uniform(-0.2, 0.2, 8), SAMPLES // 8)
@@ -130,16 +155,9 @@ def test_doublets_of_a_pilot_are_no_feedback(seed: int, side_s: float) -> None:
 def test_slow_inputs_that_the_aircraft_follows_are_no_feedback(highest_hz: float) -> None:
     """Below the short period q and p follow the stick, and smooth inputs are known beforehand."""
     rng = np.random.default_rng(5)
-    t = DT_S * np.arange(SAMPLES)
-    hz = np.arange(0.1, highest_hz, 0.1)
-
-    def sines() -> np.ndarray:
-        phase = rng.uniform(0.0, 2.0 * np.pi, len(hz))
-        waves = np.sin(2.0 * np.pi * hz * t[:, None] + phase)
-        return np.asarray(0.05 * waves.sum(axis=1) / np.sqrt(len(hz)))
-
-    assert found_in(flown("short-period", {"elevator_rad": sines()}, None, 5)) == []
-    both = {"aileron_rad": sines(), "rudder_rad": sines()}
+    alone = {"elevator_rad": sines(highest_hz, rng)}
+    assert found_in(flown("short-period", alone, None, 5)) == []
+    both = {"aileron_rad": sines(highest_hz, rng), "rudder_rad": sines(highest_hz, rng)}
     assert found_in(flown("lateral", both, None, 5)) == []
 
 

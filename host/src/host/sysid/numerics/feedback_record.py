@@ -10,6 +10,7 @@ import numpy as np
 from host.arrays import Array, IntArray
 from host.sysid.numerics.first_order_filter import first_order_filter
 
+LONGEST_S = 0.4  # delay of a law; as far apart samples are independent
 MOST_ROWS = 500  # that are compared; more tell no more of a few numbers
 LAGS_S = (0.0, 0.1, 0.3)  # shorter ones are a delay
 WASHOUTS_S = (np.inf, 4.0, 2.0, 1.0, 0.5)
@@ -42,6 +43,7 @@ class FeedbackRecord:
         stride = max(1, -(-sum(len(w) for w in windows) // MOST_ROWS))
         kept = [np.asarray(w)[::stride] for w in windows if len(w)]
         self.dt_s = dt_s
+        self.independent = max(sum(map(len, windows)) * dt_s / LONGEST_S, 1.0)  # samples
         self.values = values - values[0]
         self._behind: dict[Shape, Array] = {}  # the signals, of single filters of the grid
         self.rows: IntArray = np.concatenate(kept) if kept else np.zeros(0, dtype=np.int64)

@@ -3,10 +3,13 @@
     u(t) = sum_k K_k * F(s) * x_k(t - delay) + constant,   F(s) = 1 / (1 + s lag) * s T / (1 + s T)
 
 One filter and one delay are common to all signals, so that no derivative can be made of two of them
-that would undo the aircraft. An aircraft answers its input later, a law answers the aircraft later:
-a law must explain the input from what was, better than anything does from what is to come. In
-closed loop only what such a law leaves over tells input and signals apart (Soderstrom & Stoica,
-System Identification, 1989, ch. 10).
+that would undo the aircraft. One criterion takes the best of all sets of signals and filters
+(Schwarz, Annals of Statistics 6, 1978).
+
+An aircraft answers its input later, a law answers the aircraft later: a law must explain the input
+from what was, better than anything does from what is to come. In closed loop only what such a law
+leaves over tells input and signals apart (Soderstrom & Stoica, System Identification, 1989, ch.
+10).
 
 An autopilot has gyros of its own, or reads the logged ones at another time: the noise of measured
 signals is then in no input. It hides a law and makes its gains small. Where its size is known it is
@@ -17,31 +20,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.sysid.numerics.feedback_record import NO_FILTER, SHAPES, FeedbackRecord, Shape
+from host.constants import TRUST_SHARE
+from host.sysid.numerics.feedback_record import LONGEST_S, NO_FILTER, SHAPES, FeedbackRecord, Shape
 
-FEWEST_ROWS = 40
-STEP_S, LONGEST_S = 0.02, 0.4  # of the delays tried
+STEP_S = 0.02
+DELAYS_S = STEP_S * np.arange(round(LONGEST_S / STEP_S) + 1)  # that are tried
 RESPONSE_STEPS = 2  # steps: from here on a signal answers the input
-WORTH = 0.7  # of what is left unexplained: a further signal must leave no more
-FILTER_WORTH = 0.5  # the same of a filter
-TOGETHER_WORTH = 0.25  # the same of several signals at once
-ENOUGH_R2 = 0.99  # an input so well explained asks for no further signal or filter
-MOST_SIGNALS = 4
-HOPELESS = 0.4  # R2 of all signals at their best delay, without a filter
-FEEDBACK_R2 = 0.9  # R2 from which an input is a function of the signals
-BETTER = 0.6  # of what later signals leave unexplained: earlier ones must leave no more
+# Of the input's variance: what a law leaves gives the derivatives beside it ten times the variance.
+MOST_LEFT = 0.1
+# A part of the input whose amplitude is within what an estimate is trusted by is as good as none.
+LEAST_LEFT = TRUST_SHARE**2
 RIDGE = 1e-10  # of a signal's power
-MOST_NOISE = 0.5  # of any sum of signals, and of the input: a noisier one tells no law
-NOISE_KNOWN = 0.1  # a law leaves this share of its noise at least: no better is it known
-SHARED = 0.5  # of the noise: a law that explains more than there is by this has it in the input too
-MORE = 0.5  # of what is explained, where R2 is as large as noise allows: the better delay
-WORSE = 0.01  # in R2 than on the grid: no better delay or filter
-FLAT = 0.8  # of the largest value: a lower neighbour is on no parabola with it
+END = 0.01  # of a step, and of a time constant: a search ends
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,15 +65,22 @@ class FeedbackLaw:
     r2: float
 
 
-@dataclass(frozen=True, slots=True)
-class _Found:
-    """Signals by number, with their filter (lag, wash-out) and delay; is noise taken out?"""
+class _Found(NamedTuple):
+    """Signals by number with delay, lag and wash-out; the share of the input that they leave."""
 
-    r2: float = 0.0
     signals: tuple[int, ...] = ()
-    shape: Shape = NO_FILTER
     delay_s: float = 0.0
-    cleaned: bool = False
+    shape: Shape = NO_FILTER
+    cleaned: bool = False  # is noise taken out?
+    left: float = 1.0
+    exact: bool = False  # is that as little as noise lets know?
+    gains: Array = np.zeros(0)
+
+    def cost(self, independent: float) -> float:
+        """Return Schwarz's criterion by the number of independent samples."""
+        filters = (self.shape[0] > 0.0) + (self.shape[1] < np.inf)
+        size = len(self.signals) + filters
+        return float(independent * np.log(max(self.left, LEAST_LEFT)) + size * np.log(independent))
 
 
 def feedback_law(
@@ -104,178 +107,133 @@ def feedback_law(
     """
     if not signals:
         return None
-    values, names = np.column_stack(list(signals.values())), tuple(signals)
-    record = FeedbackRecord(dt_s, moved, values, windows, noise)
-    before = _before(record)
-    law = _law(record, before, names)
-    if law is None and len(noise) and before.r2 >= FEEDBACK_R2:
-        # All of the noise may be in the input too.
-        record = FeedbackRecord(dt_s, moved, values, windows)
-        law = _law(record, _before(record), names)
-    return law
-
-
-def _delays() -> Array:
-    return STEP_S * np.arange(round(LONGEST_S / STEP_S) + 1)
-
-
-def _before(record: FeedbackRecord) -> _Found:
-    """Return what of earlier signals explains the input, nothing where that is hopeless."""
-    if record.rows.size < FEWEST_ROWS or not float(record.target @ record.target) > 0.0:
-        return _Found()
-    everything = range(record.values.shape[1])
-    if np.max(_r2(*record.products(NO_FILTER, _delays()), everything)) < HOPELESS:
-        return _Found()
-    return _simplest(record, dict.fromkeys(SHAPES, _delays()), FEEDBACK_R2)
-
-
-def _law(record: FeedbackRecord, before: _Found, names: Sequence[str]) -> FeedbackLaw | None:
-    """Return the law, if earlier signals explain enough, and better than later ones."""
-    if before.r2 < FEEDBACK_R2:
+    record = FeedbackRecord(dt_s, moved, np.column_stack(list(signals.values())), windows, noise)
+    if not float(record.target @ record.target) > 0.0:
         return None
-    later = {shape: -shape[0] - _delays()[RESPONSE_STEPS:] for shape in SHAPES}
-    after = _simplest(record, later)
-    if 1.0 - before.r2 > BETTER * (1.0 - after.r2):
+    before = _law(record)
+    if before.left > MOST_LEFT:
         return None
-    return _refined(record, before, names)
+    # The criterion's price of one more number.
+    gained = record.independent * np.log(_after(record) / before.left)
+    if gained < np.log(record.independent):
+        return None
+    names, sizes = tuple(signals), np.std(record.values[record.rows], axis=0)
+    order = np.argsort(-np.abs(before.gains) * sizes[list(before.signals)])
+    return FeedbackLaw(
+        tuple(names[before.signals[k]] for k in order),
+        tuple(float(before.gains[k]) for k in order),
+        before.delay_s,
+        *before.shape,
+        1.0 - before.left,
+    )
 
 
-class _Grid(NamedTuple):
-    """Delays of each filter, products of the input and all signals behind them, and of noise.
+def _after(record: FeedbackRecord) -> float:
+    """Return how little of the input all signals leave from what is to come."""
+    later = {shape: -shape[0] - DELAYS_S[RESPONSE_STEPS:] for shape in SHAPES}
+    return min(f.left for f in _tried(record, _grid(record, later), record.values.shape[1]))
 
-    Those are of shape (filters, delays, 1 + signals, 1 + signals), noise has no last axis.
+
+def _law(record: FeedbackRecord) -> _Found:
+    """Return the signals, the filter and the delay of least criterion; none where all leave much.
+
+    All sets of as many signals are tried: one after the other, a signal that is like several
+    together would stand for them (heading, bank and roll rate of an autopilot). More signals are
+    tried while fewer leave something.
     """
+    grid, signals = _grid(record, dict.fromkeys(SHAPES, DELAYS_S)), record.values.shape[1]
+    best = _Found()
+    if min(f.left for f in _tried(record, grid, signals)) > MOST_LEFT:
+        return best
+    for size in range(1, signals + 1):
+        tried = _tried(record, grid, size)
+        found = _refined(record, min(tried, key=lambda f: f.cost(record.independent)))
+        if not found.cost(record.independent) < best.cost(record.independent):
+            break
+        best = found
+        if best.exact:
+            break
+    return best
 
-    delays_s: Mapping[Shape, Array]
+
+class _Products(NamedTuple):
+    """Products of the input and all signals behind a filter, of each delay, and of noise."""
+
+    shape: Shape
+    delays_s: Array
     products: Array
     noise: Array
 
 
-def _simplest(
-    record: FeedbackRecord, delays_s: Mapping[Shape, Array], least_r2: float = 0.0
-) -> _Found:
-    """Return as few signals and as simple a filter as explain the input.
-
-    One signal after the other is added while it is worth it. A law of several may need them all at
-    once (heading, bank and roll rate of an autopilot): where all together explain far more, those
-    that are not worth it are left out one by one. Of every filter as many delays are tried.
-    """
-    products, noise = zip(*(record.products(*item) for item in delays_s.items()), strict=True)
-    grid = _Grid(delays_s, np.stack(products), np.stack(noise))
-    best = _Found()
-    count = record.values.shape[1]
-    if float(np.max(_r2(grid.products, grid.noise, range(count)))) < least_r2:
-        return best
-    while len(best.signals) < min(MOST_SIGNALS, count) and best.r2 < ENOUGH_R2:
-        rest = [k for k in range(count) if k not in best.signals]
-        tried = [_best(grid, (*best.signals, k)) for k in rest]
-        found = max(tried, key=lambda f: f.r2)
-        if 1.0 - found.r2 > WORTH * (1.0 - best.r2):
-            break
-        best = found
-    fewer = _eliminated(grid, tuple(range(count)))
-    return fewer if 1.0 - fewer.r2 < TOGETHER_WORTH * (1.0 - best.r2) else best
+def _grid(record: FeedbackRecord, delays_s: Mapping[Shape, Array]) -> list[_Products]:
+    return [_Products(*item, *record.products(*item)) for item in delays_s.items()]
 
 
-def _eliminated(grid: _Grid, columns: tuple[int, ...]) -> _Found:
-    """Return what is left of some signals by backward elimination."""
-    best = _best(grid, columns)
-    while len(best.signals) > 1:
-        left = (tuple(c for c in best.signals if c != k) for k in best.signals)
-        found = max((_best(grid, some) for some in left), key=lambda f: f.r2)
-        needed = found.r2 < ENOUGH_R2 and 1.0 - best.r2 < WORTH * (1.0 - found.r2)
-        if len(best.signals) <= MOST_SIGNALS and needed:
-            break
-        best = found
-    return best
+def _tried(record: FeedbackRecord, grid: Sequence[_Products], size: int) -> list[_Found]:
+    """Return the best delay of each set of so many signals, with each filter, noise in or out."""
+    found = []
+    for columns in combinations(range(record.values.shape[1]), size):
+        for shape, delays_s, products, noise in grid:
+            for cleaned, fit in enumerate(_fits(products, noise, columns)):
+                k = int(np.argmax(fit.explained))
+                law = _Found(columns, float(delays_s[k]), shape, bool(cleaned))
+                found.append(_judged(record, law, fit, k))
+    return found
 
 
-def _best(grid: _Grid, columns: tuple[int, ...]) -> _Found:
-    """Return filter and delay of some signals: no filter where none is worth it."""
-    best = _Found()
-    fits = _fits(grid.products, grid.noise, columns)
-    for n, (shape, delays) in enumerate(grid.delays_s.items()):
-        tried = []
-        for cleaned, fit in enumerate(fits):
-            k = int(np.argmax(fit.explained[n]))
-            r2 = float(fit.r2[n, k]) + (_rise(fit.explained[n], k) if cleaned else 0.0)
-            tried.append(_Found(min(r2, 1.0), columns, shape, float(delays[k]), bool(cleaned)))
-        found = max(tried, key=lambda f: f.r2)
-        worth = best.r2 < ENOUGH_R2 and 1.0 - found.r2 < FILTER_WORTH * (1.0 - best.r2)
-        if not best.signals or worth:
-            best = found
-    return best
-
-
-def _rise(values: Array, k: int) -> float:
-    """Return by how much the parabola through the largest value and its neighbours rises more."""
-    if not 0 < k < len(values) - 1:
-        return 0.0
-    before, top, after = (float(v) for v in values[k - 1 : k + 2])
-    if min(before, after) < FLAT * top:
-        return 0.0
-    return (before - after) ** 2 / (8.0 * max(2.0 * top - before - after, 1e-300))
-
-
-def _refined(record: FeedbackRecord, found: _Found, names: Sequence[str]) -> FeedbackLaw:
-    """Return the law with delay and time constants between those of the grid."""
+def _refined(record: FeedbackRecord, found: _Found) -> _Found:
+    """Return the same with delay and time constants between those of the grid."""
     from scipy import optimize  # where no input follows anything, nothing else loads it (0.25 s)
 
-    record = record.of_signals(found.signals)
-    lag_s, washout_s = found.shape
-    lagged, washed = lag_s > 0.0, washout_s < np.inf
-    shape = [np.log(x) for x, there in ((lag_s, lagged), (washout_s, washed)) if there]
-    start = np.array([found.delay_s, *shape])
+    fewer = record.of_signals(found.signals)
+    columns = tuple(range(len(found.signals)))
+    there = np.array([0.0 < time_s < np.inf for time_s in found.shape])
+    start = np.array([found.delay_s / STEP_S, *np.log(np.array(found.shape)[there])])
 
-    def law(p: Array) -> tuple[float, float, float]:
-        lag = float(np.exp(p[1])) if lagged else 0.0
-        return max(float(p[0]), 0.0), lag, float(np.exp(p[-1])) if washed else np.inf
+    def at(p: Array) -> tuple[float, Shape, _Fit]:
+        shape = np.array(found.shape)
+        shape[there] = np.exp(p[1:])
+        delay_s = float(np.clip(STEP_S * p[0], 0.0, LONGEST_S))
+        lag_s, washout_s = (float(v) for v in shape)
+        products = fewer.products((lag_s, washout_s), np.array([delay_s]))
+        return delay_s, (lag_s, washout_s), _fits(*products, columns)[int(found.cleaned)]
 
-    def gram(p: Array) -> tuple[Array, Array]:
-        delay, lag, wash = law(p)
-        return record.products((lag, wash), np.array([delay]))
+    simplex = np.vstack([start, start + 0.5 * np.eye(len(start))])
 
-    def fit(p: Array) -> _Fit:
-        return _fits(*gram(p), range(len(found.signals)))[int(found.cleaned)]
+    def unexplained(p: Array) -> float:
+        return -float(at(p)[2].explained[0])
 
-    def left(p: Array) -> float:
-        [r2], [explained], _ = fit(p)
-        return float(1.0 - r2 - MORE * explained)
-
-    simplex = np.vstack([start, start + np.diag([STEP_S / 2.0, *[0.3] * len(shape)])])
     best = optimize.minimize(
-        left,
+        unexplained,
         start,
         method="Nelder-Mead",
-        options={"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-6, "maxfev": 80},
+        options={"initial_simplex": simplex, "xatol": END},
     )
-    # Time constants that let the signals be mostly noise explain more than there is.
-    x = start if fit(start).r2[0] > fit(best.x).r2[0] + WORSE else best.x
-    [r2], _, [gains] = fit(x)
-    order = np.argsort(-np.abs(gains) * np.sqrt(np.diag(gram(x)[0][0])[1:]))
-    return FeedbackLaw(
-        tuple(names[found.signals[k]] for k in order),
-        tuple(float(gains[k]) for k in order),
-        *law(x),
-        float(r2),
-    )
+    delay_s, shape, fit = at(best.x)
+    return _judged(record, found._replace(delay_s=delay_s, shape=shape), fit, 0)
 
 
-def _r2(products: Array, noise: Array, columns: Sequence[int]) -> Array:
-    """Return R2 of the input by some signals, of each matrix of products, (...)."""
-    return np.asarray(np.max([fit.r2 for fit in _fits(products, noise, columns)], axis=0))
+def _judged(record: FeedbackRecord, found: _Found, fit: _Fit, k: int) -> _Found:
+    """Return the same with what one fit leaves and its gains.
+
+    White noise is known no better than independent samples tell its variance.
+    """
+    known = float(np.sqrt(2.0 / record.independent) * fit.random[k])
+    left = max(float(fit.left[k]), known)
+    return found._replace(left=left, exact=left <= max(known, LEAST_LEFT), gains=fit.gains[k])
 
 
 class _Fit(NamedTuple):
-    """Fit of each matrix of products: R2, share of power explained, gains (..., signals).
+    """Fit of each matrix of products: shares of power left, explained and of noise, gains.
 
-    What is explained may be more than there is, as noise is not known exactly. It tells the better
-    delay; R2 is no better than noise is known.
+    Without noise more may be explained than there is, as noise is not known exactly or is in the
+    input too. The most explained tells the better delay all the same.
     """
 
-    r2: Array
+    left: Array
     explained: Array
     gains: Array
+    random: Array
 
 
 def _fits(products: Array, noise: Array, columns: Sequence[int]) -> list[_Fit]:
@@ -286,30 +244,27 @@ def _fits(products: Array, noise: Array, columns: Sequence[int]) -> list[_Fit]:
     own, cross = scaled[..., at, :][..., at] + RIDGE * np.eye(len(at)), scaled[..., at, 0]
     unit = scale[..., :1] / scale[..., at]
     gains = np.linalg.solve(own, cross[..., None])[..., 0]
-    r2 = np.sum(gains * cross, axis=-1)
-    fits = [_Fit(r2, r2, gains * unit)]
+    explained = np.sum(gains * cross, axis=-1)
+    fits = [_Fit(1.0 - explained, explained, gains * unit, np.zeros_like(explained))]
     if noise.any():
         share = noise / scale**2
-        r2, explained, gains = _cleaned(own, cross, (share[..., 0], share[..., at]), r2)
-        fits.append(_Fit(r2, explained, gains * unit))
+        fit = _cleaned(own, cross, share[..., 0], share[..., at])
+        fits.append(fit._replace(gains=fit.gains * unit))
     return fits
 
 
-def _cleaned(own: Array, cross: Array, noise: tuple[Array, Array], r2: Array) -> _Fit:
+def _cleaned(own: Array, cross: Array, moved: Array, share: Array) -> _Fit:
     """Return the fit without the shares of noise in input and signals, all of unit power.
 
-    Where these, or what is left with them, are mostly noise nothing is explained. More may be
-    explained than there is: noise that is in the input too was none.
+    Where these, or what is left with them, are mostly noise nothing is explained. What is explained
+    beyond all there is counts as left: noise that is in the input too was none.
     """
-    moved, share = noise
     # No sum of signals has a larger part of noise than this.
     part = np.sum(share * np.diagonal(np.linalg.inv(own), axis1=-2, axis2=-1), axis=-1)
-    usable = (part < MOST_NOISE) & (r2 > MOST_NOISE)
+    usable = part < 1.0
     clean = own - np.where(usable[..., None], share, 0.0)[..., None] * np.eye(own.shape[-1])
     gains = np.linalg.solve(clean, cross[..., None])[..., 0]
     explained = np.sum(gains * cross, axis=-1)
     random = np.sum(share * gains**2, axis=-1) + moved
-    left = 1.0 - explained - moved
-    left = np.maximum(np.maximum(left, -left - SHARED * random), NOISE_KNOWN * random)
-    usable &= random < MOST_NOISE
-    return _Fit(np.where(usable, 1.0 - left, 0.0), np.where(usable, explained, 0.0), gains)
+    left = np.abs(1.0 - explained - moved)
+    return _Fit(np.where(usable, left, 1.0), np.where(usable, explained, 0.0), gains, random)
