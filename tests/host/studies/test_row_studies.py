@@ -13,7 +13,6 @@ from studies.interval_rows import interval_figure, interval_table
 from studies.row_studies import ROW_STUDIES, RowStudy
 from studies.wrong_models import Judged, Row
 
-pytestmark = pytest.mark.usefixtures("machine_code")
 COLUMNS = ("air", "seed", "name", "true", "estimate", "half_width", "mark")
 FLOWN: list[tuple[str, int]] = []
 

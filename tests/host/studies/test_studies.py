@@ -26,8 +26,6 @@ from studies.systems import random_system
 from studies.thesis import run_hopfield, thesis_data, truth_31
 from studies.thesis_tables import PRINTED, obtained
 
-pytestmark = pytest.mark.usefixtures("machine_code")
-
 
 def test_output_error_is_an_order_closer_than_the_network() -> None:
     case = accuracy("3-2-1-1", 100.0, 30)

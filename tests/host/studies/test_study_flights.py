@@ -14,8 +14,6 @@ from studies.thesis_flights import CASES, lines, nrmse, re_enact
 
 from tests.host.sysid.at_hand import identify_coefficients
 
-pytestmark = pytest.mark.usefixtures("machine_code")
-
 
 @pytest.fixture(scope="module")
 def flight() -> VirtualFlight:

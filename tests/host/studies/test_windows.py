@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 from studies import windows
 
-pytestmark = pytest.mark.usefixtures("machine_code")
-
 
 @pytest.mark.parametrize("case", windows.CASES, ids=lambda case: case.label)
 def test_windows_of_linear_records_are_as_good_as_the_whole(case: windows.Case) -> None:

@@ -72,6 +72,7 @@ def test_a_few_fits_load_no_compiler() -> None:
     assert printed(METHODS) == "False\n"
 
 
+@pytest.mark.usefixtures("loops_as_a_user_has_them")
 def test_what_a_process_did_before_changes_no_answer() -> None:
     rng = np.random.default_rng(1)
     step, slopes = np.hstack([0.9 * np.eye(4), np.zeros((4, 2))]), rng.standard_normal((4, 6, 24))

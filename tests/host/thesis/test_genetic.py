@@ -8,8 +8,6 @@ from host.sysid import fit
 from studies.data import TRUTH, noisy
 from studies.navion import navion_structured
 
-pytestmark = pytest.mark.usefixtures("machine_code")
-
 
 @pytest.mark.costs(20, "sixty generations of a search")
 def test_genetic_search_finds_the_valley_from_far_away() -> None:

@@ -11,7 +11,6 @@ from host.sysid.flight import read_columns
 from host.sysid.linear import STAGED, Answer
 from host.sysid.maneuvers import select_maneuvers
 
-from host import compiled
 from tests.host.sysid.at_hand import identify
 from tests.host.sysid.verdicts import verdict_lines
 
@@ -21,7 +20,6 @@ SLOW = {"hopfield-line-search", "genetic", "unscented-kalman", "filter-error"}
 @pytest.fixture(scope="module")
 def answers(simulated: Callable[[str, int], Path]) -> dict[str, Answer]:
     """Every quick method on one 3-2-1-1 in light turbulence."""
-    compiled.prefer_machine_code()  # of many fits, as the studies
     flown = read_columns(simulated("demo", 3) / "flight.csv")[0]
     columns = {k: v[::2] for k, v in flown.items()}
     windows = select_maneuvers(columns, numbers=[1])

@@ -15,7 +15,6 @@ from host.sysid.numerics import OutputProblem
 
 import host
 
-pytestmark = pytest.mark.usefixtures("machine_code")
 DEG = np.pi / 180.0
 TRIM = Trim(17.0, 5.0 * DEG, 5.0 * DEG)
 TRUE = {

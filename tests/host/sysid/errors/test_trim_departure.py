@@ -216,7 +216,6 @@ def test_a_linear_record_has_no_departures() -> None:
     assert answer.result.half_width()[k] < 0.007 * abs(answer.result.estimate[k])
 
 
-@pytest.mark.usefixtures("machine_code")
 def test_drag_follows_the_lift_of_pitching_too() -> None:
     """Where the polar has all lift D_de was high by two half-widths, D_alpha by one."""
     names = ("D_alpha", "D_de")

@@ -8,7 +8,6 @@ from host.sysid.estimators import fit_output_error
 from host.sysid.models import LinearModel, Maneuver, read_model
 from host.sysid.numerics import output_problem
 
-pytestmark = pytest.mark.usefixtures("machine_code")
 TEXT = """\
 kind = "equations"
 inputs = ["elevator_rad"]

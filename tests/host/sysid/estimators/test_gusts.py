@@ -15,8 +15,6 @@ from scipy import linalg
 from studies.gusts import AXES, DT_S, fly, gusty_aircraft, spectrum
 from studies.turbulence import PROCESS, fitted_model, run_case, true_vector
 
-pytestmark = pytest.mark.usefixtures("machine_code")
-
 
 @pytest.mark.parametrize("axis", list(AXES))
 def test_coefficients_give_the_linearised_aircraft(axis: str) -> None:

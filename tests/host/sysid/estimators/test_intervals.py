@@ -9,8 +9,6 @@ from studies.coverage import NOISES, coloured_noise
 from studies.data import noisy
 from studies.navion import navion_structured
 
-pytestmark = pytest.mark.usefixtures("machine_code")
-
 
 def test_regression_finds_the_coefficients_of_a_long_record() -> None:
     rng = np.random.default_rng(1)

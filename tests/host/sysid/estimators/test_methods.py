@@ -12,8 +12,6 @@ from scipy import linalg, signal
 from studies.data import TRUTH, clean, gusty, noisy
 from studies.navion import navion, navion_free, navion_structured
 
-pytestmark = pytest.mark.usefixtures("machine_code")
-
 CHEAP = [m for m in methods() if m not in ("hopfield-line-search", "hopfield")]
 
 

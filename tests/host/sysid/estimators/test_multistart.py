@@ -16,8 +16,6 @@ from studies.inputs import SHAPES
 from studies.navion import navion_free
 from studies.systems import random_system, simulated
 
-pytestmark = pytest.mark.usefixtures("machine_code")
-
 DT_S = 0.01
 
 

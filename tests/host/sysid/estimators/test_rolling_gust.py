@@ -1,7 +1,6 @@
 """Air that rolls: a state of its own, with a lag that is a parameter."""
 
 import numpy as np
-import pytest
 from host.sysid.estimators.filter_error_gust import fit_with_gust, gust_process
 from host.sysid.estimators.gust_model import ROLL_GUST, gust_model
 from host.sysid.estimators.gust_penetration import (
@@ -73,7 +72,6 @@ def test_only_a_model_with_sideslip_and_roll_rate_feels_it() -> None:
         assert ROLL_GUST not in gust_process(other)
 
 
-@pytest.mark.usefixtures("machine_code")
 def test_roll_derivatives_are_right_in_air_that_rolls() -> None:
     """As an angle of sideslip alone it left them 10 % off (rms), now 5."""
     errors = []

@@ -12,8 +12,6 @@ from host.sysid.numerics.maneuver_agreement import (
 from studies.data import TRUTH, noisy
 from studies.navion import navion_structured
 
-pytestmark = pytest.mark.usefixtures("machine_code")
-
 MODEL = navion_structured()
 PLACE = MODEL.parameter_names.index("M_alpha")
 
