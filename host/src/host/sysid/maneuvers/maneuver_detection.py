@@ -17,31 +17,24 @@ import numpy as np
 from host.arrays import Array, BoolArray, IntArray
 from host.sysid.maneuvers.free_response import with_free_response
 from host.sysid.maneuvers.logged_inputs import logged_inputs, without_held
-from host.sysid.maneuvers.overlapping_inputs import SUSTAINED, bounded, without_echoes
+from host.sysid.maneuvers.overlapping_inputs import WEAKER, bounded, rad_of, without_echoes
 from host.sysid.maneuvers.sustained_inputs import QUIET, sustained_inputs
 
 LAG_S = 0.12  # a hand needs about this long for one edge
 LEAST_EDGE_RAD = 0.025  # 1.4 degrees: a pulse smaller than this excites nothing on a trainer
-LEAST_EDGE_THROTTLE = 0.12
 STILL_RAD = 1e-3  # a surface that moves less moves nothing
 THROTTLE = (-0.2, 1.2)  # beyond, it is no share of full
 ACTIVITY = 6.0  # edges stand out by this many robust deviations of the surface's activity
-JOIN_S = 1.6  # between edges of one input; wider for a throttle pulse
-JOIN_THROTTLE_S = 3.0
+JOIN_S = 1.6  # between edges of one input
 HOLD_S = 6.0  # longest step of an input
-SLOW = (0.007, 0.15)  # least swing of an input without edges: surfaces, throttle
-AWAY = 0.3  # of an input: a surface that is held further from its rest is not at rest
+SLOW_RAD = 0.007  # least swing of an input without edges
+AWAY = 0.3  # of an input, or of the answer to it: what is further from its rest is not at rest
 OUT = 0.4  # of an input: the surface stands at one side
-WEAKER = 0.6  # of an input with edges: swings of the pilot next to it
-SHORT_S = 20.0  # a record no longer than this was cut to its input
-TURNING = 0.3  # of the rates behind an edge: before it an aircraft in trim turns less
 PARTING_GAP_S = 5.0
 SHORTEST_PART_S = 1.0  # of a maneuver that a gap divides
 TRIM_AFTER_GAP_S = 0.5  # fits of coefficients reach as far back from the start
 FEWEST = 8  # samples, as a maneuver needs
-SWEEP_LEAD_S = 25.0  # slow swings of a sweep are looked for this far before its first edge
 STEADY_TREND = 0.6  # rank correlation of swing length with order: a sweep's swings shorten
-SWEEP_GAP_S = 1.2  # a 0.15 Hz sine is near its trim no longer than this
 RESPONSE_S = 3.0  # the window reaches this long past the last edge
 LEAD_S = 0.3  # of trim before the input, in a fit
 TRIM_S = 1.0  # quiet time before the input
@@ -175,7 +168,7 @@ def _find_axis(
     lag += lag == 1 and dt_s < LAG_S
     groups = _edges(axis, t, series, flying, lag)
     groups = _join_held(groups, t, series, lag)
-    slow = sustained_inputs(t, series, flying, SLOW[axis == "throttle"])
+    slow = sustained_inputs(t, series, flying, SLOW_RAD / rad_of(axis))
     result = []
     for first, last in _united(groups, slow, series, lag):
         sharp = any(first <= begin <= last for begin, _ in groups)
@@ -193,12 +186,11 @@ def _edges(
     change[~flying] = 0.0
     # A low quantile, because a sweep can fill most of a record; of a normal one it is 0.253 sigma.
     quiet = float(np.quantile(np.abs(change[flying]), QUIET)) / 0.253 if flying.any() else 0.0
-    least = LEAST_EDGE_THROTTLE if axis == "throttle" else LEAST_EDGE_RAD
+    least = LEAST_EDGE_RAD / rad_of(axis)
     hot = np.flatnonzero(np.abs(change) > max(least, ACTIVITY * quiet))
     if len(hot) == 0:
         return []
-    join = JOIN_THROTTLE_S if axis == "throttle" else JOIN_S
-    groups = np.split(hot, np.flatnonzero(np.diff(t[hot]) > join) + 1)
+    groups = np.split(hot, np.flatnonzero(np.diff(t[hot]) > JOIN_S) + 1)
     return [(int(group[0]), int(group[-1])) for group in groups]
 
 
@@ -213,7 +205,7 @@ def _join_held(
             rest = float(np.median(series[max(0, begin - 3 * lag) : max(1, begin - lag)]))
             away = np.abs(series[end : first - lag] - rest)
             size = float(np.max(np.abs(series[begin : last + 1] - rest)))
-            held = len(away) > 0 and bool(np.mean(away > AWAY * size) > 0.9)
+            held = len(away) > 0 and bool(np.min(away) > AWAY * size)
             if held and t[first] - t[end] < HOLD_S:
                 joined[-1] = (begin, last)
                 continue
@@ -271,13 +263,10 @@ def _describe(
         return []
     if len(runs) < 3 and abs(settle - trim) > 0.6 * amplitude:
         return []  # a step that stays is a change of trim (a launch), not a test input
-    kind = _kind(runs)
-    if kind in SUSTAINED:
-        start = _slow_start(t, series, start, amplitude)
     return [
         DetectedManeuver(
             axis=axis,
-            kind=kind,
+            kind=_kind(runs),
             start_s=float(t[start]),
             input_end_s=float(t[min(end + 1, len(t) - 1)]),
             end_s=float(t[min(end + 1, len(t) - 1)]) + RESPONSE_S,
@@ -290,40 +279,26 @@ def _describe(
 def _begins_inside(t: Array, series: Array, first: int, settle: float, rate: Array) -> bool:
     """Return whether the record begins in an input whose first edge seen is `first`.
 
-    It is away from where it comes to rest. A single step may be one of trim as well; in a flight it
-    is taken for that, but where the aircraft turned already, and in a record cut to a few seconds
-    for the end of a pulse.
+    It is away from where it comes to rest. A single step may be one of trim as well, and is taken
+    for that, but where the aircraft turned already.
     """
     if t[first] - t[0] > HOLD_S:
         return False
     away = series[: first + 1] - settle
     behind = series[first:] - settle
     size = max(float(np.max(np.abs(away))), float(np.max(np.abs(behind))))
-    held = bool(np.mean(np.abs(away) > AWAY * size) > 0.7)
+    held = bool(np.median(np.abs(away)) > AWAY * size)
     both = bool(np.min(behind * np.sign(away[0])) < -AWAY * size)
-    short = float(t[-1] - t[0]) < SHORT_S
-    return held and (both or short or _turns_already(away, rate, first, size))
+    return held and (both or _turns_already(away, rate, first, size))
 
 
 def _turns_already(away: Array, rate: Array, first: int, size: float) -> bool:
     """Return whether an aircraft answers a held surface as it answers the edge that ends it."""
     held = round(0.8 * first)  # the edge itself aside
     before, after = rate[:held], rate[first : 2 * first + 1]
-    if held < FEWEST or np.ptp(np.quantile(away[:held], (0.05, 0.95))) > AWAY * size:
+    if held < FEWEST or np.ptp(away[:held]) > AWAY * size:
         return False
-    return bool(np.std(before) > TURNING * np.std(after) > 0.0)
-
-
-def _slow_start(t: Array, series: Array, start: int, amplitude: float) -> int:
-    """Return where a sweep begins: its first swings are too slow to be edges."""
-    first = int(np.searchsorted(t, t[start] - SWEEP_LEAD_S))
-    trim = float(np.median(series[first : start + 1]))
-    away = np.flatnonzero(np.abs(series[first : start + 1] - trim) > 0.35 * amplitude) + first
-    for k in away[::-1]:
-        if t[start] - t[k] > SWEEP_GAP_S:
-            break
-        start = int(k)
-    return start
+    return bool(np.std(before) > AWAY * np.std(after) > 0.0)
 
 
 def _runs(level: Array, t: Array) -> list[tuple[int, float]]:

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 
 FAINT = 0.2  # of an input: a weaker one of another surface is the pilot's, and ends no response
-WEAKER = 0.5  # of an input that it overlaps: a stronger one is no echo
+WEAKER = 0.5  # of an input that it overlaps: a stronger one is no echo, nor a pilot's handling
+FULL_RAD = 0.3  # the surface that full throttle counts as
 # Which way a hand that levels moves a surface, from the jump on with which it takes over.
 LEVELLING = {"elevator_rad": ("theta_rad", 1.0), "aileron_rad": ("phi_rad", -1.0)}
 FOLLOWS_S, FOLLOWED = (0.1, 1.5), 0.75
@@ -107,4 +108,9 @@ def _weaker(item: DetectedManeuver, other: DetectedManeuver, share: float) -> bo
 
 def _strength(item: DetectedManeuver) -> float:
     """Return the amplitude, that of a throttle as one of a surface."""
-    return item.amplitude * (0.3 if item.axis == "throttle" else 1.0)
+    return item.amplitude * rad_of(item.axis)
+
+
+def rad_of(axis: str) -> float:
+    """Return which angle of a surface one unit of an axis counts as."""
+    return FULL_RAD if axis == "throttle" else 1.0
