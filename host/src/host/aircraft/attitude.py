@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from host.aircraft.airframe import Array
+from host.arrays import Array as Column
 
 
 def quaternion(phi_rad: float, theta_rad: float, psi_rad: float) -> Array:
@@ -29,6 +30,18 @@ def euler(q: Array) -> tuple[Array, Array, Array]:
     theta = np.arcsin(np.clip(-2 * (q1 * q3 - q0 * q2), -1.0, 1.0))
     psi = np.arctan2(2 * (q1 * q2 + q0 * q3), q0**2 + q1**2 - q2**2 - q3**2)
     return phi, theta, psi
+
+
+def euler_rates(
+    phi: Column, theta: Column, p: Column, q: Column, r: Column
+) -> tuple[Column, Column, Column]:
+    """Return the rates of phi, theta and psi (rad/s) at rates of the body (EQUATIONS.md, eq. 3)."""
+    turning = q * np.sin(phi) + r * np.cos(phi)
+    return (
+        p + np.tan(theta) * turning,
+        q * np.cos(phi) - r * np.sin(phi),
+        turning / np.cos(theta),
+    )
 
 
 def to_body(q: Array) -> Array:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from host.aircraft.airframe import ELEVATOR, Q0, STATE_COUNT, Airframe, Array
-from host.aircraft.attitude import euler, quaternion
+from host.aircraft.attitude import euler, euler_rates, quaternion
 from host.aircraft.mode_names import DUTCH_ROLL, PHUGOID, ROLL, ROLL_SPIRAL, SHORT_PERIOD, SPIRAL
 from host.aircraft.rigid_body import derivative
 from host.aircraft.trim import Trim
@@ -70,11 +69,7 @@ def linearise(frame: Airframe, trim: Trim, width: float = 1e-5) -> Linear:
         command[:3] = values[8:]
         out = np.empty(STATE_COUNT + 4)
         derivative(frame, x, command, still, trim.density_kgpm3, out)
-        p, q, r = values[3:6]
-        turn = q * math.sin(phi) + r * math.cos(phi)
-        return np.concatenate(
-            [out[:6], [p + turn * math.tan(theta), q * math.cos(phi) - r * math.sin(phi)]]
-        )
+        return np.concatenate([out[:6], euler_rates(phi, theta, *values[3:6])[:2]])
 
     point = np.concatenate([trim.state[:6], angles[:2], trim.state[ELEVATOR : ELEVATOR + 3]])
     slopes = np.empty((8, 11))

@@ -11,7 +11,6 @@ from host.sysid.answer.marks import MARKS, SMALL, Judged, mark_of
 from host.sysid.models.diagnostics import reference_values
 
 if TYPE_CHECKING:
-    from host.sysid.aerodynamics.coefficient import Coefficient
     from host.sysid.linear.linear_answer import Answer
 
 
@@ -25,18 +24,23 @@ def converted_marks(answer: Answer, marks: Mapping[str, str]) -> dict[str, str]:
     marks : mapping
         Of the derivatives, by `judge`; a coefficient whose derivative has none has none.
     """
-    found = {}
+    found, shares = {}, converted_shares(answer)
     for c in answer.coefficients:
         behind = marks.get(dimensional_name(c.name), "")
         if behind:
-            own = mark_of(Judged(c.name, _share(answer, c)))
+            own = mark_of(Judged(c.name, shares[c.name]))
             found[c.name] = behind if behind == SMALL else max(behind, own, key=MARKS.index)
     return found
 
 
-def _share(answer: Answer, c: Coefficient) -> float:
-    """Return the half-width over the value, or over what would contribute 5 % of the row."""
-    result, name = answer.result, dimensional_name(c.name)
-    size = reference_values(answer.model, answer.maneuvers, result.estimate)[result.index(name)]
-    larger = max(float(size) / max(abs(result.value(name)), 1e-300), 1.0)
-    return c.half_width / max(larger * abs(c.value), 1e-300)
+def converted_shares(answer: Answer) -> dict[str, float]:
+    """Return the half-width of each coefficient over its value, or over what would contribute 5 %
+    of its row."""
+    result = answer.result
+    sizes = reference_values(answer.model, answer.maneuvers, result.estimate)
+    found = {}
+    for c in answer.coefficients:
+        at = result.index(dimensional_name(c.name))
+        larger = max(float(sizes[at]) / max(abs(float(result.estimate[at])), 1e-300), 1.0)
+        found[c.name] = c.half_width / max(larger * abs(c.value), 1e-300)
+    return found

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from host.aircraft.gains import COEFFICIENT_ROWS, coefficient_name
-from host.sysid.answer.converted_marks import converted_marks
+from host.sysid.answer.converted_marks import converted_marks, converted_shares
 from host.sysid.answer.parameter_words import in_words, word_of
 from host.sysid.errors.widest_errors import NOISE, OUTSIDE_MODEL
 from host.sysid.models.parameter_units import parameter_unit
@@ -89,7 +89,7 @@ def _linear_rows(answer: Answer, verdict: Verdict) -> Iterator[SummaryRow]:
 
     result, half = answer.result, answer.result.half_width()
     size = reference_values(answer.model, answer.maneuvers, result.estimate)
-    converted = converted_marks(answer, verdict.marks)
+    converted, shares = converted_marks(answer, verdict.marks), converted_shares(answer)
     became = {c.name: c for c in answer.coefficients if c.name in converted}
     for k, p in enumerate(answer.model.parameters):
         if p.name not in verdict.marks:
@@ -100,9 +100,8 @@ def _linear_rows(answer: Answer, verdict: Verdict) -> Iterator[SummaryRow]:
         against = verdict.reasons.get(p.name, ())[1:]
         if c is not None:
             mark = converted[c.name]
-            share = c.half_width / max(abs(c.value), 1e-300) * min(abs(value) / reference, 1.0)
-            yield SummaryRow(c.name, in_words(c.name), c.value, c.half_width, share, "", mark,
-                             word_of(mark), c.widened_by, against)  # fmt: skip
+            yield SummaryRow(c.name, in_words(c.name), c.value, c.half_width, shares[c.name], "",
+                             mark, word_of(mark), c.widened_by, against)  # fmt: skip
             continue
         mark = verdict.marks[p.name]
         called = "" if answer.own_model else in_words(p.name)

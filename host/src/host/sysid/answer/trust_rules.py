@@ -12,13 +12,26 @@ from typing import TYPE_CHECKING, Any
 
 from host.sysid.answer.doubt import Doubt, Evidence, doubt
 from host.sysid.answer.feedback_pairs import feedback_of
-from host.sysid.answer.impossible_signs import impossible_signs
 from host.sysid.checks.data_finding import open_channels
 
 if TYPE_CHECKING:
     from host.sysid.answer.estimate_view import EstimateView
 
 Rule = Callable[[Any, Evidence], list[Doubt]]  # of a view
+# Signs of derivatives in the house's convention, and what they say. Cm_alpha may have either: an
+# unstable aircraft flies too. A canard's elevator is turned round by its map.
+POSSIBLE: dict[str, tuple[float, str]] = {
+    "Z_alpha": (-1.0, "lift must grow with the angle of attack"),
+    "L_p": (-1.0, "rolling must be damped"),
+    "M_de": (-1.0, "elevator down must pitch the nose down"),
+    "N_dr": (-1.0, "rudder left must yaw the nose left"),
+    "L_da": (1.0, "aileron must roll to the side where it is up"),
+    "CL_alpha": (1.0, "lift must grow with the angle of attack"),
+    "Cl_p": (-1.0, "rolling must be damped"),
+    "Cm_de": (-1.0, "elevator down must pitch the nose down"),
+    "Cn_dr": (-1.0, "rudder left must yaw the nose left"),
+    "Cl_da": (1.0, "aileron must roll to the side where it is up"),
+}
 
 
 def own(rule: Rule) -> Rule:
@@ -55,9 +68,14 @@ def impossible_sign(view: EstimateView, evidence: Evidence) -> list[Doubt]:
 
     Of a user's own model only the bounds speak.
     """
+    impossible = {
+        name: f"its sign is impossible: {POSSIBLE[name][1]}"
+        for name, value in view.values.items()
+        if name in POSSIBLE and value * POSSIBLE[name][0] < 0.0
+    }
     return [
         one
-        for name, reason in impossible_signs(view.values).items()
+        for name, reason in impossible.items()
         for one in (
             *doubt([name], view.names, reason),
             *doubt(

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from host.aircraft.attitude import euler_rates
 from host.arrays import Array, BoolArray
 from host.constants import GRAVITY_MPS2
 from host.readers.column_sampling import runs
@@ -122,7 +123,7 @@ def _others_move(columns: Mapping[str, Array], name: str, first: int, end: int) 
 def expected_motion(columns: Mapping[str, Array], name: str) -> Array | None:
     """Return how the other sensors say that a sensor moves, up to a constant; None if they do not.
 
-    Kinematics of a rigid body (EQUATIONS.md, eq. 3 and eq. 6): angles and speed are integrals of
+    Kinematics of a rigid body (EQUATIONS.md, eq. 6): angles and speed are integrals of
     rates and forces, rates and forces their slopes.
     """
     t, c = columns["t_s"], columns
@@ -133,12 +134,13 @@ def expected_motion(columns: Mapping[str, Array], name: str) -> Array | None:
     speed = np.maximum(c.get("airspeed_mps", zero), 1.0)
     weight = GRAVITY_MPS2 * np.cos(theta)
     level = "theta_rad" in c and "airspeed_mps" in c
-    turning = q * np.sin(phi) + r * np.cos(phi)
-    steep = np.clip(theta, -STEEPEST_RAD, STEEPEST_RAD)
+    rolling, pitching, turning = euler_rates(
+        phi, np.clip(theta, -STEEPEST_RAD, STEEPEST_RAD), p, q, r
+    )
     rates = {
-        "theta_rad": ("q_radps" in c, q * np.cos(phi) - r * np.sin(phi)),
-        "phi_rad": ("p_radps" in c, p + np.tan(steep) * turning),
-        "psi_rad": ("r_radps" in c, turning / np.cos(steep)),
+        "theta_rad": ("q_radps" in c, pitching),
+        "phi_rad": ("p_radps" in c, rolling),
+        "psi_rad": ("r_radps" in c, turning),
         "alpha_rad": (
             "q_radps" in c and "az_mps2" in c and level,
             q + (c.get("az_mps2", zero) + weight * np.cos(phi)) / speed,

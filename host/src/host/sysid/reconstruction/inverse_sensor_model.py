@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from host.aircraft.attitude import euler_rates
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel
 from host.physical.recording import SURFACES
@@ -132,14 +133,12 @@ def decimate(columns: Mapping[str, Array], dt_s: float) -> Record:
 def attitude(record: Record, s: Mapping[str, Array]) -> tuple[Array, Array]:
     """Return phi and theta, rad, by a complementary filter.
 
-    Low frequencies come from the attitude filter, high ones from phi' = p + tan(theta) (q sin(phi)
-    + r cos(phi)) and theta' = q cos(phi) - r sin(phi) (EQUATIONS.md, eq. 3).
+    Low frequencies come from the attitude filter, high ones from the gyros.
     """
     phi, theta = record.smooth("phi_rad"), record.smooth("theta_rad")
-    across = s["q"] * np.sin(phi) + s["r"] * np.cos(phi)
-    rates = (s["p"] + np.tan(theta) * across, s["q"] * np.cos(phi) - s["r"] * np.sin(phi))
+    rates = euler_rates(phi, theta, s["p"], s["q"], s["r"])
     blended = []
-    for angle, rate in zip((phi, theta), rates, strict=True):
+    for angle, rate in zip((phi, theta), rates[:2], strict=True):
         both = ATTITUDE_CROSSOVER_RADPS * angle + rate
         line = np.linspace(both[0], both[-1], len(both)) / ATTITUDE_CROSSOVER_RADPS
         blended.append(record.filtered(both, 1.0 / (record.jw + ATTITUDE_CROSSOVER_RADPS)) + line)

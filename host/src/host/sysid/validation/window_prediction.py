@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from host.aircraft.attitude import euler_rates
 from host.arrays import Array, IntArray
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
@@ -182,8 +183,7 @@ def _persistence(
     names = ("p_radps", "q_radps", "r_radps", "phi_rad", "theta_rad")
     p, q, r, phi, theta = (np.array(flown.get(name, zero)[starts]) for name in names)
     for k in range(steps):
-        across = q * np.sin(phi) + r * np.cos(phi)
-        rates = p + np.tan(theta) * across, q * np.cos(phi) - r * np.sin(phi)
+        rates = euler_rates(phi, theta, p, q, r)
         phi, theta = phi + rates[0] * maneuver.dt_s, theta + rates[1] * maneuver.dt_s
         for name, angle in (("phi_rad", phi), ("theta_rad", theta)):
             if name in model.outputs:
