@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
-from host.sysid.maneuvers.overlapping_inputs import SUSTAINED, flown_together
+from host.sysid.maneuvers.overlapping_inputs import SUSTAINED, flown_together, rad_of
+from host.sysid.numerics.white_noise import white_deviation
 
 if TYPE_CHECKING:
     from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 
-MOVED_RAD, MOVED_THROTTLE = 0.0035, 0.02  # by as much a surface leaves its rest: 0.2 deg, or
+MOVED_RAD = 0.0035  # by as much a surface leaves its rest: 0.2 deg, or
 MOVED_SHARE = 0.05  # of the input, or
 MOVED_NOISE = 5.0  # deviations of its noise; a pilot who holds the attitude moves it more
 REST_S = 0.5  # after the input, in which surfaces come to rest
@@ -48,7 +49,7 @@ def with_free_response(
         In flight, and measured.
     """
     still = {
-        name: max(MOVED_THROTTLE if name == "throttle" else MOVED_RAD, MOVED_NOISE * _noise(series))
+        name: max(MOVED_RAD / rad_of(name), MOVED_NOISE * float(white_deviation([series])))
         for name, series in surfaces.items()
     }
     groups = flown_together(found)
@@ -120,9 +121,3 @@ def _since(t: Array, at_rest: _AtRest, to_s: float, limit_s: float) -> float:
         return to_s
     span = np.arange(first, max(settled[0], first) + 1)[::-1]
     return float(t[span[at_rest.samples(span, settled) - 1]])
-
-
-def _noise(series: Array) -> float:
-    """Return the deviation of white noise, from second differences: motion has hardly any."""
-    second = np.abs(np.diff(series, n=2))
-    return float(np.median(second)) / (0.6745 * np.sqrt(6.0)) if len(second) else 0.0

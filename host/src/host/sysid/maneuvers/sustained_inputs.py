@@ -13,7 +13,7 @@ from host.arrays import Array, BoolArray
 HALF_S = 1.0  # of the window of a swing
 QUIET = 0.2  # quantile: the quietest fifth of a flight has no input
 ABOVE = 4.0  # swings of an input over those of the quiet fifth of the flight
-SMALL, LOW, LOW_SHARE = 0.2, 3.0, 0.5  # of its own swings, of quiet ones, of the least: it goes on
+SMALL, LOW_SHARE = 0.2, 0.5  # of its own swings, of the least: it goes on
 CUT_S = 60.0  # a record no longer than this may have been cut to its input, and hardly have a rest
 NO_REST = 10.0  # its large swings over its quiet ones, where it has none
 SHORTEST_S = 5.0
@@ -40,15 +40,15 @@ def sustained_inputs(
         return []
     swing = _swing(series, half)
     cut = flying.sum() * dt_s <= CUT_S
-    quiet, large = np.quantile(swing[flying], (0.05 if cut else QUIET, 0.95))
-    if cut and large < NO_REST * quiet:
+    quiet = float(np.quantile(swing[flying], 0.05 if cut else QUIET))
+    if cut and float(np.max(swing[flying])) < NO_REST * quiet:
         quiet = 0.0
     active = flying & (swing > ABOVE * quiet) & (_swing(_smoothed(series, dt_s), half) > least)
     found: list[tuple[int, int]] = []
     for first, last in _spans(active):
         # Slow swings at both ends belong to it: small against its own, but no rest yet.
         own = SMALL * float(np.median(swing[first : last + 1]))
-        going = flying & (swing > max(own, LOW * quiet, LOW_SHARE * least))
+        going = flying & (swing > max(own, ABOVE * quiet, LOW_SHARE * least))
         first, last = _run_about(going, first, last)
         if found and first <= found[-1][1]:
             first = found.pop()[0]
