@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from host.constants import GRAVITY_MPS2
 from host.errors import IdentificationError
 from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.varying_airspeed import VaryingModel
@@ -72,6 +73,7 @@ def test_departures_vanish_at_the_trim() -> None:
             "beta_rad", "p_radps", "q_radps", "r_radps", "phi_rad", "ax_mps2", "ay_mps2", "az_mps2",
         )
     }  # fmt: skip
+    columns["az_mps2"] = np.full(samples, -GRAVITY_MPS2)
     columns["airspeed_mps"] = np.full(samples, plane.trim.airspeed_mps)
     columns["alpha_rad"] = np.full(samples, plane.trim.alpha_rad)
     columns["theta_rad"] = np.full(samples, plane.trim.theta_rad)

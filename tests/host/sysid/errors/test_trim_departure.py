@@ -14,14 +14,15 @@ from host.instrument.deviations import unknown_sensors
 from host.readers.even_grid import even_columns
 from host.sysid.aerodynamics import coefficient_parts, coefficients
 from host.sysid.answer import true_coefficients
-from host.sysid.errors.trim_departure import spin_of
+from host.sysid.errors import trim_departure
+from host.sysid.errors.trim_departure import correct_trim_departure, spin_of
 from host.sysid.estimators import fit
 from host.sysid.estimators.start_values import regression_estimates, start_values
 from host.sysid.flight import flown_maneuvers, reconstruct_flight
 from host.sysid.linear import gust_at_trim, linear_fit
 from host.sysid.linear.linear_model import imu_place_m, without_attitude
 from host.sysid.maneuvers import DetectedManeuver
-from host.sysid.models import FitResult, Trim, template
+from host.sysid.models import FitResult, Maneuver, Trim, template
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.numerics import OutputProblem
 from host.twin.testcard.cards import load
@@ -112,6 +113,40 @@ def test_airspeed_that_falls_with_the_rudder_is_not_taken_for_a_derivative(
         assert plain[name] > 0.2, name
         assert moved[name] < 0.35 * plain[name], name
     assert moved["Cn_r"] < 0.05
+
+
+def test_moments_that_follow_airspeed_and_lift_are_no_derivatives(
+    calm: tuple[Columns, list[dict[str, Any]]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ailerons hold against the propeller's torque, and more of it at a higher airspeed."""
+    columns, maneuvers = calm
+    data, cuts, trim = [], [], Trim(*_steady(columns, maneuvers))
+    base = template("lateral", trim)
+    for m in maneuvers:
+        inside = (columns["t_s"] >= m["start_s"]) & (columns["t_s"] <= m["end_s"])
+        cut = {name: values[inside] for name, values in columns.items()}
+        u, y = (np.column_stack([cut[c] for c in names]) for names in (base.inputs, base.outputs))
+        data.append(Maneuver(float(np.diff(cut["t_s"])[0]), u, y))
+        cuts.append(cut)
+    plain = fit("output-error-white", base, data, multiple_starts=False)
+    spin = spin_of(powerplant(NAME), cuts)
+    true = {n: np.mean([m["dimensional"][n] for m in maneuvers]) for n in base.parameter_names}
+
+    def miss(name: str) -> float:
+        found = correct_trim_departure(plain, data, cuts, bare(), trim, spin)
+        assert found is not None
+        return float((plain.estimate + found.step)[plain.index(name)] / true[name] - 1.0)
+
+    moved = {name: miss(name) for name in ("L_beta", "L_r", "N_beta", "N_r", "N_dr")}
+    assert all(abs(one) < 0.01 for one in moved.values()), moved
+    monkeypatch.setattr(trim_departure, "_following", lambda _: {})
+    assert miss("L_r") > 0.02
+    assert abs(miss("N_r")) > 2.0 * abs(moved["N_r"])
+
+
+def _steady(columns: Columns, maneuvers: list[dict[str, Any]]) -> list[float]:
+    flown = (columns["t_s"] >= maneuvers[0]["start_s"]) & (columns["t_s"] <= maneuvers[-1]["end_s"])
+    return [float(np.mean(columns[c][flown])) for c in ("airspeed_mps", "alpha_rad", "theta_rad")]
 
 
 def test_equation_error_gives_the_start_though_places_and_delays_are_free(

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 from host.arrays import Array, IntArray
-from host.sysid.numerics import ArNoise
-from host.sysid.numerics.score_variance import _by_innovations, white_fit_variance
+from host.sysid.numerics.joint_noise import JointNoise
+from host.sysid.numerics.score_variance import white_fit_variance
 from scipy.signal import lfilter
 
 SAMPLES, DRAWS = 400, 600
 MEMORY = (np.array([0.9]), np.array([1.5, -0.7]))
 SIZE = np.array([0.02, 0.03])  # deviation of the innovations
+LATER = 3  # samples from a gust at the first output to the same at the second
 
 
 @dataclass
@@ -41,9 +42,10 @@ class TwoLines:
         return None
 
 
-def _noise(rng: np.random.Generator, together: float) -> Array:
+def _noise(rng: np.random.Generator, together: float, later: int) -> Array:
     both = rng.standard_normal((2, SAMPLES + 200))
-    both[1] = together * both[0] + np.sqrt(1.0 - together**2) * both[1]
+    gust = np.roll(both[0], later)
+    both[1] = together * gust + np.sqrt(1.0 - together**2) * both[1]
     made = [
         lfilter([size], [1.0, *-coefficient], row)
         for size, coefficient, row in zip(SIZE, MEMORY, both, strict=True)
@@ -51,27 +53,40 @@ def _noise(rng: np.random.Generator, together: float) -> Array:
     return np.array(made)[:, 200:]
 
 
-@pytest.mark.parametrize("together", [-0.9, 0.9])
-def test_variance_is_that_of_draws(together: float) -> None:
-    """A gust that moves both outputs counts between them: without, +-0.9 are as none."""
+def _memory(together: float, later: int) -> JointNoise:
+    coefficients, covariance = np.zeros((LATER + 1, 2, 2)), np.diag(SIZE**2)
+    for j, own in enumerate(MEMORY):
+        coefficients[: len(own), j, j] = own
+    if later == 0:
+        covariance[0, 1] = covariance[1, 0] = together * SIZE[0] * SIZE[1]
+    else:  # the innovation of the first, which is what its autoregression leaves
+        share = together * SIZE[1] / SIZE[0]
+        coefficients[later - 1 : later + 1, 1, 0] = share, -share * MEMORY[0][0]
+        covariance[1, 1] *= 1.0 - together**2
+    return JointNoise(coefficients, covariance)
+
+
+@pytest.mark.parametrize(("together", "later"), [(-0.9, 0), (0.9, 0), (0.9, LATER), (-0.9, LATER)])
+def test_variance_is_that_of_draws(together: float, later: int) -> None:
+    """A gust that moves both outputs counts between them, at once or one after the other."""
     rng = np.random.default_rng(11)
     t = np.arange(SAMPLES) * 0.05
     slopes = np.stack([
         np.column_stack([np.sin(1.1 * t), np.cos(0.4 * t)]),
         np.column_stack([np.sin(1.1 * t + 0.3), 0.5 * np.cos(0.4 * t)]),
     ])  # fmt: skip
-    memories = [ArNoise.from_coefficient(a) for a in MEMORY]
     problem, estimates, told = TwoLines(slopes), [], []
-    usual = np.mean([_noise(rng, together) ** 2 for _ in range(20)], axis=(0, 2))
+    usual = np.mean([_noise(rng, together, later) ** 2 for _ in range(20)], axis=(0, 2))
     weight = 1.0 / usual
     M = np.einsum("j,jtk,jtl->kl", weight, slopes, slopes)
     for number in range(DRAWS):
-        noise = _noise(rng, together)
+        noise = _noise(rng, together, later)
         step = np.linalg.solve(M, np.einsum("j,jtk,jt->k", weight, slopes, noise))
         estimates.append(step)
         if number % 20 == 0:
             problem.left = noise - slopes @ step
-            told.append(white_fit_variance(_any(problem), _responses(slopes), memories, SIZE**2))
+            memory = _memory(together, later)
+            told.append(white_fit_variance(_any(problem), _responses(slopes), memory))
     drawn = np.var(estimates, axis=0)
     np.testing.assert_allclose(np.mean(told, axis=0), drawn, rtol=0.2)
 
@@ -82,13 +97,3 @@ def _any(value: object) -> Any:
 
 def _responses(slopes: Array) -> list[Any]:
     return [SimpleNamespace(y=np.zeros((2, SAMPLES)), sensitivities=slopes)]
-
-
-def test_slopes_by_innovations() -> None:
-    """S' n = G' e for a noise that begins at rest."""
-    rng = np.random.default_rng(2)
-    e, slopes = rng.standard_normal(50), rng.standard_normal((50, 3))
-    n = np.zeros(50)
-    for t in range(50):
-        n[t] = e[t] + sum(a * n[t - k] for k, a in enumerate(MEMORY[1], start=1) if t >= k)
-    np.testing.assert_allclose(_by_innovations(MEMORY[1], slopes).T @ e, slopes.T @ n)

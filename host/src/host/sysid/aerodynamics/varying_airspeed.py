@@ -12,7 +12,7 @@ EQUATIONS.md, eq. 8.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,20 +34,20 @@ MEASURED = (
 # Of airspeed, whose noise would multiply every term: as long as the data allow. In calm air 0.1 s
 # left as much of it in N_dr as all other noise together.
 SMOOTH_S = (0.05, 0.1, 0.2, 0.4)
-# What follows lift, with a parameter of its own: name, row, column, and whether by the angle of
-# attack. Drag is a parabola in lift, of which the template has not that of pitching; dihedral, roll
-# by yawing and yaw by rolling follow lift.
-LIFT_TERMS: dict[str, tuple[tuple[str, str, str, bool], ...]] = {
+# What follows lift, with a parameter of its own: name, row, column, and what multiplies the column.
+# Drag is a parabola in lift, of which the template has not that of pitching; dihedral, roll by
+# yawing and yaw by rolling follow it (Etkin & Reid, Dynamics of Flight, 3rd ed., app. B).
+LIFT_TERMS: dict[str, tuple[tuple[str, str, str, str], ...]] = {
     "longitudinal": (
-        ("D_alpha_alpha", "airspeed_mps", "alpha_rad", True),
-        ("D_q", "airspeed_mps", "q_radps", False),
+        ("D_alpha_alpha", "airspeed_mps", "alpha_rad", "alpha"),
+        ("D_q", "airspeed_mps", "q_radps", ""),
     ),
     "short-period": (),
     "lateral": (
-        ("L_beta_alpha", "p_radps", "beta_rad", True),
-        ("L_r_alpha", "p_radps", "r_radps", True),
-        ("N_beta_alpha", "r_radps", "beta_rad", True),
-        ("N_p_alpha", "r_radps", "p_radps", True),
+        ("L_beta_lift", "p_radps", "beta_rad", "lift"),
+        ("L_r_lift", "p_radps", "r_radps", "lift"),
+        ("N_beta_lift", "r_radps", "beta_rad", "lift"),
+        ("N_p_lift", "r_radps", "p_radps", "lift"),
     ),
     "dutch-roll": (),
     "roll": (),
@@ -83,6 +83,9 @@ class VaryingModel:
         Of a reduced template, as parameters behind its own.
     thrust : tuple of LeftOutTerm
         What measured thrust does, likewise.
+    normal_mps2 : float or None
+        Specific force normal to the path that the parameters belong to (`mean_normal`); None: the
+        mean of each maneuver.
     """
 
     base: LinearModel
@@ -92,6 +95,7 @@ class VaryingModel:
     spin_kgm2ps: tuple[float, float] = (0.0, 0.0)
     left_out: tuple[LeftOutTerm, ...] = ()
     thrust: tuple[LeftOutTerm, ...] = ()
+    normal_mps2: float | None = None
 
     def __post_init__(self) -> None:
         if self.axis not in LIFT_TERMS:
@@ -169,8 +173,8 @@ class VaryingModel:
             *(f"{column} by V^{power}" for column, power in self.scaled),
             *(f"rest of {name}" for name in (*base.states, *self.forces)),
             *(
-                f"{column} by alpha on {row}" if by_alpha else f"{column} on {row}"
-                for _, row, column, by_alpha in LIFT_TERMS[self.axis]
+                f"{column} by {by} on {row}" if by else f"{column} on {row}"
+                for _, row, column, by in LIFT_TERMS[self.axis]
             ),
             *(("airspeed over its trim",) if AIRSPEED_TERMS[self.axis] else ()),
             *(t.input_name for t in self.added_terms),
@@ -208,11 +212,7 @@ class VaryingModel:
         inputs += self._scaled_columns(columns, ratio)
         inputs += [self._moving(_deviation(rest)) for rest in self._nonlinear_rates(columns, ratio)]
         inputs += [_deviation(rest) for rest in self._nonlinear_forces(columns, ratio)]
-        angle = _deviation(columns["alpha_rad"])
-        inputs += [
-            self._moving(_deviation((angle if by_alpha else 1.0) * _deviation(columns[column])))
-            for _, _, column, by_alpha in LIFT_TERMS[self.axis]
-        ]
+        inputs += self._lift_columns(columns, ratio, dt_s)
         if AIRSPEED_TERMS[self.axis]:
             inputs.append(self._moving(ratio - 1.0))
         inputs += [self._moving(_deviation(columns[t.column])) for t in self.added_terms]
@@ -226,6 +226,26 @@ class VaryingModel:
             change = (ratio**power - 1.0) * _deviation(columns[column])
             found.append(change if column in self.base.inputs else self._moving(change))
         return found
+
+    def _lift_columns(self, columns: Mapping[str, Array], ratio: Array, dt_s: float) -> list[Array]:
+        """Return what lift changes of each column whose effect follows it."""
+        found = []
+        for _, _, column, by in LIFT_TERMS[self.axis]:
+            own = _deviation(columns[column])
+            if by == "lift":
+                power = 1 if column in RATES else 2
+                own = own * ratio**power * self._change_of_lift(columns, ratio, dt_s)
+            elif by == "alpha":
+                own = own * _deviation(columns["alpha_rad"])
+            held = column in self.base.inputs
+            found.append(_deviation(own) if held else self._moving(_deviation(own)))
+        return found
+
+    def _change_of_lift(self, columns: Mapping[str, Array], ratio: Array, dt_s: float) -> Array:
+        """Return the lift coefficient over that of the trim, less one."""
+        normal = _without_noise(_normal(columns), dt_s) / ratio**2
+        own = float(np.mean(normal))
+        return normal / (own if self.normal_mps2 is None else self.normal_mps2) - 1.0
 
     def _known(self) -> Array:
         """Return kinematics and gravity of the template."""
@@ -327,6 +347,24 @@ class VaryingModel:
             + by_rotation.get(y, 0.0)
             for y in self.forces
         ]
+
+
+def mean_normal(cuts: Sequence[Mapping[str, Array]], trim: Trim) -> float:
+    """Return the mean specific force normal to the path at the airspeed of a trim, m/s2.
+
+    Parameters
+    ----------
+    cuts : sequence of mapping
+        All columns of each maneuver.
+    trim : Trim
+    """
+    every = [_normal(c) * (trim.airspeed_mps / c["airspeed_mps"]) ** 2 for c in cuts]
+    return float(np.mean(np.concatenate(every)))
+
+
+def _normal(columns: Mapping[str, Array]) -> Array:
+    alpha = columns["alpha_rad"]
+    return np.asarray(columns["az_mps2"] * np.cos(alpha) - columns["ax_mps2"] * np.sin(alpha))
 
 
 def _without_noise(values: Array, dt_s: float) -> Array:

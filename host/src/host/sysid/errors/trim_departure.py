@@ -7,9 +7,10 @@ lateral fit has N_p 39 %, N_da twofold and L_dr 53 % off by that. What the depar
 own method: N_p is then 0.5, N_da 11 and L_dr 5 % off.
 
 The drag polar is a parabola in lift; its curvature is estimated along, and drag by the lift of
-pitching. So is what a reduced template leaves out of the other lateral states
-(`aerodynamics/left_out_terms.py`). Filter error with the gust is fitted to what output error says
-is left without departures, and corrected by what that left.
+pitching. So is what follows lift in the lateral motion, the propeller's torque, and what a reduced
+template leaves out of the other lateral states (`aerodynamics/left_out_terms.py`). Filter error
+with the gust is fitted to what output error says is left without departures, and corrected by what
+that left.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from host.sysid.aerodynamics.left_out_terms import (
 from host.sysid.aerodynamics.path_thrust import rotor_means
 from host.sysid.aerodynamics.thrust_terms import thrust_terms
 from host.sysid.aerodynamics.unmeasured_motion import with_unmeasured
-from host.sysid.aerodynamics.varying_airspeed import LIFT_TERMS, MEASURED, VaryingModel
+from host.sysid.aerodynamics.varying_airspeed import LIFT_TERMS, MEASURED, VaryingModel, mean_normal
 from host.sysid.errors.departure import Departure, expected_nuisance, with_second_order
 from host.sysid.errors.one_step import CERTAIN_SD, HALF_WAY, OneStep, Step, one_step_of
 from host.sysid.models.fit_result import FitResult
@@ -45,6 +46,9 @@ REMAINDER_SHARE = 0.25  # of the step: what one step and terms of second order l
 DEPARTURES = "departures from the linear model"
 DRAG_POLAR = "curvature of the drag polar"
 THRUST_ACTS = "curvature of the drag polar, and what thrust does"
+LATERAL, TORQUE = "lateral", "L_V"
+SHARED = ("L_beta", "L_r", "N_p")  # by wing and fin; N_beta is the fin's
+LIFT_ACTS = "derivatives that follow lift, and the torque of the propeller"
 LEFT_OUT = "motion that the model leaves out"
 # Of D_alpha_alpha over V Z_alpha, which is 2 C_D_CL2 C_L_alpha of a parabolic polar: 0.3 to 1.
 LARGEST_CURVATURE = 3.0
@@ -71,8 +75,9 @@ class _Departing:
         Terms that a template has not: what is expected, and one deviation.
     thrust : dict
         What thrust is expected to do.
-    polar : dict
-        Of each term of the drag polar what is expected, and one deviation.
+    second_order : dict
+        Of each term of the drag polar, or that follows lift or airspeed, what is expected, and one
+        deviation.
     """
 
     base: LinearModel
@@ -82,23 +87,25 @@ class _Departing:
     cuts: list[Mapping[str, Array]]
     nuisance: dict[str, tuple[float, float]]
     thrust: dict[str, float]
-    polar: dict[str, tuple[float, float]]
+    second_order: dict[str, tuple[float, float]]
 
     @property
     def along(self) -> dict[str, float]:
         """What is estimated along, and one deviation of each."""
-        return {name: sd for name, (_, sd) in (self.polar | self.nuisance).items()}
+        return {name: sd for name, (_, sd) in (self.second_order | self.nuisance).items()}
 
     @property
     def expected(self) -> dict[str, float]:
-        """What the drag polar and thrust are expected to do."""
-        return {name: mean for name, (mean, _) in self.polar.items()} | self.thrust
+        """What terms of second order and thrust are expected to do."""
+        return {name: mean for name, (mean, _) in self.second_order.items()} | self.thrust
 
     @property
     def cause(self) -> str:
         """What an answer calls that of which the data leave something open."""
         if self.varying.left_out:
             return LEFT_OUT
+        if self.varying.axis == LATERAL:
+            return LIFT_ACTS
         return THRUST_ACTS if self.varying.thrust else DRAG_POLAR
 
     def model(self, known: Mapping[str, float]) -> LinearModel:
@@ -119,7 +126,7 @@ class _Departing:
             for name, value in zip(self.along, step.added, strict=True)
         }
         # What is fitted with thrust has the drag polar too.
-        polar = self.polar if self.thrust else {}
+        polar = self.second_order if self.thrust else {}
         return Departure(
             step.shares, tuple(open_ones), self.varying, self.model(known),
             tuple(self.data), polar | self.nuisance,
@@ -196,7 +203,8 @@ def _departing(
         trim = replace(trim, airspeed_mps=UNKNOWN_MPS)
     whole = [with_unmeasured(c, base, result.estimate, trim) for c in cuts]
     thrust = thrust_terms(base, whole, trim, airframe)
-    varying = VaryingModel(base, base.name, trim, airframe, spin, left_out, thrust)
+    normal = mean_normal(whole, trim)
+    varying = VaryingModel(base, base.name, trim, airframe, spin, left_out, thrust, normal)
     nuisance = expected_nuisance(result, (*left_out, *thrust))
     return _Departing(
         base,
@@ -209,7 +217,7 @@ def _departing(
         list(whole),
         nuisance,
         {t.name: nuisance[t.name][0] for t in thrust},
-        _polar(result, trim, pitching=not thrust),
+        _polar(result, trim, pitching=not thrust) | _following(result),
     )
 
 
@@ -291,6 +299,23 @@ def _polar(result: FitResult, trim: Trim, *, pitching: bool) -> dict[str, tuple[
     whole = drag * by_rate / lift
     by_pitching = {"D_q": (0.5 * whole, 0.5 * EVEN_SD * abs(whole))} if pitching else {}
     return {"D_alpha_alpha": curvature, **by_pitching}
+
+
+def _following(result: FitResult) -> dict[str, tuple[float, float]]:
+    """Return what is expected of terms that follow lift or airspeed, and one deviation.
+
+    Wing and fin share a derivative that follows lift: anything from nothing to all of it does,
+    evenly. How much more the aileron that holds against the propeller's torque holds at a higher
+    airspeed is free: no aircraft file says it. Moments about the other axes are not: taken along,
+    Cn_r of logs without vanes has 2.6 times its error.
+    """
+    if result.model.name != LATERAL:
+        return {}
+    found = {TORQUE: (0.0, np.inf)}
+    for name in (n for n in SHARED if n in result.names):
+        value, error = result.value(name), float(result.standard_error[result.index(name)])
+        found[f"{name}_lift"] = (0.5 * value, 0.5 * EVEN_SD * float(np.hypot(value, error)))
+    return found
 
 
 def spin_of(

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
 from host.instrument.deviations import airspeed_share, dynamic_pressure_share, unknown_sensors
@@ -31,7 +33,8 @@ from host.sysid.linear.linear_stages import LinearEstimate, LinearIntervals
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.uncertainty import Uncertainty
-from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
+from host.sysid.numerics.input_coherence import InputCoherence, driven_data, input_coherence
+from host.sysid.numerics.joint_noise import JointNoise, joint_noise
 from host.sysid.numerics.maneuver_agreement import disagreement, maneuver_agreement
 from host.sysid.numerics.score_variance import white_fit_variance
 from host.sysid.reconstruction.flight_path import PITOT
@@ -101,8 +104,8 @@ def _noise(
     known = replace(e.noise, warnings=())
     # Before maneuvers are compared: by noise without memory a gust made them disagree.
     if free is not None and coherence is not None and e.fit.method == WHITE:
-        memory, power = coherence.noise, coherence.innovation_variance
-        variance = white_fit_variance(free.problem, free.responses, memory, power)
+        together = _joint_noise(e, free)
+        variance = white_fit_variance(free.problem, free.responses, together)
         known = widened_to(known, variance[: len(e.fit.model.parameter_names)])
     return known.plus(column_noise(e.fit, e.found.maneuvers, e.trim))
 
@@ -121,13 +124,28 @@ def _with_model_error(
     )
 
 
+def _joint_noise(e: LinearEstimate, free: FreeResponses) -> JointNoise:
+    """Return the noise of all outputs, without what inputs drive and known errors do."""
+    problem = free.problem
+    data = driven_data(problem, free.responses, _known_errors(e, free))
+    ones = np.ones(data[0].slopes[0].shape[1] - len(problem.names))
+    prior = np.concatenate([problem.prior_precision, ones])
+    pulled = problem.prior_precision * (problem.prior_mean - free.theta)
+    return joint_noise(data, prior, np.concatenate([pulled, 0.0 * ones]), problem.least_variance)
+
+
 def _coherence(e: LinearEstimate, free: FreeResponses) -> InputCoherence:
     """Return what the inputs drive outside the model and what the instrument's file leaves open."""
+    known = _known_errors(e, free)
+    return input_coherence(free.problem, free.responses, free.theta, nuisance=known)
+
+
+def _known_errors(e: LinearEstimate, free: FreeResponses) -> list[Array]:
+    """Return what one deviation of each error of the sensors changes of the residuals."""
     known = [c for c in _carriers(e) if c is not None]
-    nuisance: list[Array] = []
-    if len(known) == len(e.columns.used):
-        nuisance = systematic_residuals(free.problem, free.theta, e.columns.cuts, known, e.trim)
-    return input_coherence(free.problem, free.responses, free.theta, nuisance=nuisance)
+    if len(known) < len(e.columns.used):
+        return []
+    return systematic_residuals(free.problem, free.theta, e.columns.cuts, known, e.trim)
 
 
 def _carriers(e: LinearEstimate) -> list[Compatibility | None]:

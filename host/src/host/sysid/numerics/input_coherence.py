@@ -176,9 +176,8 @@ def input_coherence(
         Residuals are taken in means over this long; 0 keeps the samples, and the noise models are
         then those of samples.
     """
-    data = _data(problem, responses, block_s, nuisance)
+    data = driven_data(problem, responses, nuisance, block_s)
     count = len(problem.names)
-    data = _with_what_shows(data, count, problem.least_variance)
     own_prior, known = problem.prior_precision, data[0].slopes[0].shape[1] - count
     prior = np.concatenate([own_prior, np.ones(known)])
     pulled = np.concatenate([own_prior * (problem.prior_mean - theta), np.zeros(known)])
@@ -246,12 +245,23 @@ def input_coherence(
     )
 
 
-def _data(
+def driven_data(
     problem: OutputProblem,
     responses: Sequence[Response],
-    block_s: float,
-    nuisance: Sequence[Array],
+    nuisance: Sequence[Array] = (),
+    block_s: float = BLOCK_S,
 ) -> list[OutputData]:
+    """Return means of each output: residuals, slopes, and columns that the inputs drive.
+
+    Behind the slopes by the parameters stand those by the known errors that show, in deviations.
+
+    Parameters
+    ----------
+    problem : OutputProblem
+    responses : sequence of Response
+    nuisance : sequence of Array, shape (p, samples, k)
+    block_s : float
+    """
     model, size = problem.model, len(problem.names)
     shortest_s = min(m.samples * m.dt_s for m in problem.maneuvers)
     knots_s = lag_knots_s(max(m.dt_s for m in problem.maneuvers), shortest_s)
@@ -275,7 +285,7 @@ def _data(
             residuals.append(block_means(left[:, None], block, seen)[:, 0])
             extra.append(block_means(added[number], block, seen))
         found.append(OutputData(residuals, slopes, extra))
-    return found
+    return _with_what_shows(found, size, problem.least_variance)
 
 
 def _with_what_shows(data: list[OutputData], count: int, least_variance: Array) -> list[OutputData]:

@@ -28,7 +28,6 @@ from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.uncertainty import Uncertainty, covariance_root
 from host.sysid.numerics.ar_noise import ArNoise, autocovariance
 from host.sysid.numerics.input_coherence import InputCoherence, block_length, block_means
-from host.sysid.numerics.score_variance import LONGEST_LAG
 from host.sysid.validation.free_simulation import free_responses, weighted_fit
 from host.sysid.validation.noise_model_limits import (
     DRAWS,
@@ -39,6 +38,7 @@ from host.sysid.validation.noise_model_limits import (
 )
 
 FAILS = 0.5  # NRMSE of an output: a quarter of its variance is not explained
+LONGEST_LAG = 200  # of an autocorrelation that counts, means
 DRAW_SEED = 1
 
 
