@@ -63,9 +63,12 @@ def _program(module: str, *words: str) -> "subprocess.Popen[bytes]":
     )
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
-    """Two workers that only who has the certificate can reach."""
+    """Two workers that only who has the certificate can reach.
+
+    They end with this folder: five processes that wait take 6 % of a core.
+    """
     from dask import config
     from distributed import Client
 
