@@ -213,7 +213,9 @@ def step_along(
         x[i] += h / 6.0 * total[i]
         if m.bias_column[i] >= 0:
             B[i, m.bias_column[i]] = 1.0
-    B[:, :n] = fx
+    for a in range(n):
+        for b in range(n):
+            B[a, b] = fx[a, b]
     fu *= by_delay
     add_columns(fp, m.column, B)
     add_columns(fu, m.input_column, B)
@@ -309,14 +311,16 @@ def equation_outputs(
         if delay >= 0:
             # An output that an input drives at once sees that input later too.
             input_rate(m.inputs, position, shift, m.input_column, m.ramp, rate, unused, by_shift)
-            for b in range(inputs):
-                reached[:, delay] -= yu[:, b] * rate[b] / m.dt_s
+            for i in range(outputs):
+                for b in range(inputs):
+                    reached[i, delay] -= yu[i, b] * rate[b] / m.dt_s
             input_at(m.inputs, position, shift, m.input_column, m.ramp, u, by_shift)
         add_columns(yu * by_shift / m.dt_s, m.input_column, reached)
         for i in range(outputs):
             if m.leader[i] == j:
                 y[i] = own[i] + offset[i]
-                H[i] = reached[i]
+                for b in range(L):
+                    H[i, b] = reached[i, b]
                 if m.offset_column[i] >= 0:
                     H[i, m.offset_column[i]] += 1.0
 

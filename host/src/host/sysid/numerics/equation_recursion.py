@@ -196,6 +196,18 @@ def take_stage_inputs(
 
 
 @compiled_part
+def begin_step(begin: Array, x: Array, sum_: Array) -> None:
+    """Write the begin of a step (n, ...) into `x`, and no rates into their sum.
+
+    A loop: to assign a slice compiles the text of an error too, 0.7 s each.
+    """
+    for i in range(len(x)):
+        for j in range(x.shape[1]):
+            x[i, j] = begin[i, j]
+            sum_[i, j] = 0.0
+
+
+@compiled_part
 def add_rates(
     rate: Array, weight: float, ahead: float, begin: Array, sum_: Array, x: Array
 ) -> None:
@@ -254,9 +266,10 @@ def run_equations(
     """
     (n, L), m, q, outputs = by_start.shape, len(shift), len(column), y.shape[1]
     state, stage, total, f = np.zeros((4, n, 1))
-    state[:, 0] = start
+    for i in range(n):
+        state[i, 0] = start[i]
     S, T, total_S, K = np.zeros((4, n, L))
-    S[:, :] = by_start
+    add_times(1.0, by_start, S)
     u, slope = np.zeros(m), np.zeros(m)
     fx, fu, fp = np.zeros((n, n)), np.zeros((n, m)), np.zeros((n, q))
     yx, yu, yp = np.zeros((outputs, n)), np.zeros((outputs, m)), np.zeros((outputs, q))
@@ -277,7 +290,8 @@ def run_equations(
         while whole < substeps and k < len(inputs) - 1:
             end = end_of_step(position, (whole + 1.0) / substeps, shift, ramp)
             h = (end - position) * dt_s
-            stage[:, :], total[:, :], T[:, :], total_S[:, :] = state, 0.0, S, 0.0
+            begin_step(state, stage, total)
+            begin_step(S, T, total_S)
             for number in range(4):
                 weight, late, ahead = STAGES[number]
                 share = position + late * (end - position)

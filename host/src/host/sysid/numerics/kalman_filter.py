@@ -177,7 +177,7 @@ def filter_maneuver(
             e[k, j] = measured[k, j] - y[j]
             independent[k, j] = e[k, j] - np.dot(H[j], change)
             if total:
-                by_left[:] = -by_y[j]
+                np.negative(by_y[j], by_left)
                 for a in range(n):
                     for q in range(total):
                         by_left[q] -= by_H[j, a, q] * change[a] + H[j, a] * by_change[a, q]
@@ -189,7 +189,11 @@ def filter_maneuver(
                 return False
         x += change
         by_x += by_change
-        x[:] = np.minimum(np.maximum(x, lower), upper)
+        for a in range(n):
+            if x[a] < lower[a]:
+                x[a] = lower[a]
+            elif x[a] > upper[a]:
+                x[a] = upper[a]
         if k + 1 < len(measured) and not step_ahead(model, k, x, by_x, P, P_slopes):
             return False
     return True
