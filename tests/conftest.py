@@ -71,7 +71,7 @@ def pytest_runtest_makereport(
     used_s = own_s - own_before_s
     # A process that an earlier case left and that was waited for in this one brings all the time of
     # its life along, and nothing says how much of the sum it is.
-    if left <= _children():
+    if others_s > others_before_s and left <= _children():
         used_s += others_s - others_before_s
     item.user_properties.append(("cpu_s", f"{used_s:.2f}"))
     report = yield
