@@ -126,7 +126,7 @@ class Sampler:
             Without, there are slopes by no unknown.
         """
         model = self.model
-        A, B, _, _ = model.matrices(local)
+        A, B, C, D = model.matrices(local)
         n, m = B.shape
         count = self.width if slopes else 0
         entries = self._entries if slopes else NO_ENTRIES
@@ -142,7 +142,7 @@ class Sampler:
             entries.gain,
             count,
         )
-        read, by_read = self.reading(local)
+        read, by_read = self._reading(A, B, C, D, local)
         return SampledModel(
             step=step,
             by_step=by_step,
@@ -154,7 +154,9 @@ class Sampler:
 
     def reading(self, local: Array) -> tuple[Array, Array]:
         """Return outputs by state and drive at values of the unknowns, and their slopes."""
-        A, B, C, D = self.model.matrices(local)
+        return self._reading(*self.model.matrices(local), local)
+
+    def _reading(self, A: Array, B: Array, C: Array, D: Array, local: Array) -> tuple[Array, Array]:
         n, m = B.shape
         read = np.zeros((len(C), self._wide))
         read[:, :n], read[:, n : n + m], read[:, n + m] = C, D, local[self.offset]
