@@ -7,7 +7,7 @@ drive the residual (`numerics.input_coherence`), its power above noise counts in
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -91,11 +91,11 @@ def driven_by_inputs(
     return ModelError(factor, least, shift, freedom=freedom, warnings=tuple(lines))
 
 
-def widened_to(known: Uncertainty, variance: Array) -> Uncertainty:
-    """Return a covariance that knows no first parameter better than its variance here, (k,)."""
-    own = known.variance[: len(variance)]
-    ratio = np.where(own > 0.0, variance / np.maximum(own, 1e-300), 1.0)
-    return known.times(np.sqrt(np.maximum(ratio, 1.0)))
+def widened_to(known: Uncertainty, covariance: Array) -> Uncertainty:
+    """Return a covariance in place of another, no parameter known better than by either, (P, P)."""
+    own = np.diag(covariance)
+    ratio = np.where(own > 0.0, known.variance / np.maximum(own, 1e-300), 1.0)
+    return replace(known, covariance=covariance).times(np.sqrt(np.maximum(ratio, 1.0)))
 
 
 def _lines(

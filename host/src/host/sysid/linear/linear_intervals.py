@@ -36,7 +36,7 @@ from host.sysid.models.uncertainty import Uncertainty
 from host.sysid.numerics.input_coherence import InputCoherence, driven_data, input_coherence
 from host.sysid.numerics.joint_noise import JointNoise, joint_noise
 from host.sysid.numerics.maneuver_agreement import disagreement, maneuver_agreement
-from host.sysid.numerics.score_variance import white_fit_variance
+from host.sysid.numerics.score_variance import white_fit_covariance
 from host.sysid.reconstruction.flight_path import PITOT
 from host.sysid.reconstruction.reconstruction import Compatibility
 from host.sysid.reconstruction.sensor_corrections import DENSITY
@@ -105,8 +105,7 @@ def _noise(
     # Before maneuvers are compared: by noise without memory a gust made them disagree.
     if free is not None and coherence is not None and e.fit.method == WHITE:
         together = _joint_noise(e, free)
-        variance = white_fit_variance(free.problem, free.responses, together)
-        known = widened_to(known, variance[: len(e.fit.model.parameter_names)])
+        known = widened_to(known, white_fit_covariance(free.problem, free.responses, together))
     return known.plus(column_noise(e.fit, e.found.maneuvers, e.trim))
 
 

@@ -25,10 +25,10 @@ from host.sysid.numerics.simulator import Response
 MOST_POWER = 3.0
 
 
-def white_fit_variance(
+def white_fit_covariance(
     problem: OutputProblem, responses: Sequence[Response], noise: JointNoise
 ) -> Array:
-    """Return the variance of each parameter of white output error in noise with a memory.
+    """Return the covariance of white output error in noise with a memory.
 
     M^-1 (sum S' R S + P) M^-1 with R of the noise, not of the residuals: these lack what the
     parameters took, slow gusts most (M_q of two maneuvers in 0.5 m/s: 38 of 50 intervals held).
@@ -43,13 +43,13 @@ def white_fit_variance(
 
     Returns
     -------
-    Array, shape (P,)
+    Array, shape (P, P)
     """
     residuals = [problem.residual(k, r.y) for k, r in enumerate(responses)]
     squares = np.sum([np.sum(r**2, axis=1) for r in residuals], axis=0)
     variance = np.maximum(squares / problem.counts, problem.least_variance)
     total = np.diag(problem.prior_precision)
-    score = total.copy()
+    scores = [np.diag(np.sqrt(problem.prior_precision))]
     for number, (response, m) in enumerate(zip(responses, problem.maneuvers, strict=True)):
         own, block = problem.columns(number), block_length(m.dt_s)
         weighed = []
@@ -64,9 +64,11 @@ def white_fit_variance(
         moved = noise.by_innovations(np.stack(weighed, axis=1) * np.sqrt(capped)[:, None]).reshape(
             -1, len(own)
         )
-        score[np.ix_(own, own)] += moved.T @ moved
-    inverse = covariance_from_information(total)
-    return np.asarray(np.diag(inverse @ score @ inverse))
+        scores.append(np.zeros((len(moved), len(total))))
+        scores[-1][:, own] = moved
+    # By its root: a direction without information is 1e8 times as long as others.
+    root = np.concatenate(scores) @ covariance_from_information(total)
+    return np.asarray(root.T @ root)
 
 
 def variance_ratio(

@@ -1,4 +1,4 @@
-"""Variance of white output error in noise with a memory that all outputs share: against draws."""
+"""Covariance of white output error in noise with a memory that all outputs share: against draws."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from host.arrays import Array, IntArray
 from host.sysid.numerics.joint_noise import JointNoise
-from host.sysid.numerics.score_variance import white_fit_variance
+from host.sysid.numerics.score_variance import white_fit_covariance
 from scipy.signal import lfilter
 
 SAMPLES, DRAWS = 400, 600
@@ -67,7 +67,7 @@ def _memory(together: float, later: int) -> JointNoise:
 
 
 @pytest.mark.parametrize(("together", "later"), [(-0.9, 0), (0.9, 0), (0.9, LATER), (-0.9, LATER)])
-def test_variance_is_that_of_draws(together: float, later: int) -> None:
+def test_covariance_is_that_of_draws(together: float, later: int) -> None:
     """A gust that moves both outputs counts between them, at once or one after the other."""
     rng = np.random.default_rng(11)
     t = np.arange(SAMPLES) * 0.05
@@ -86,9 +86,11 @@ def test_variance_is_that_of_draws(together: float, later: int) -> None:
         if number % 20 == 0:
             problem.left = noise - slopes @ step
             memory = _memory(together, later)
-            told.append(white_fit_variance(_any(problem), _responses(slopes), memory))
-    drawn = np.var(estimates, axis=0)
-    np.testing.assert_allclose(np.mean(told, axis=0), drawn, rtol=0.2)
+            told.append(white_fit_covariance(_any(problem), _responses(slopes), memory))
+    drawn, found = np.cov(np.transpose(estimates)), np.mean(told, axis=0)
+    np.testing.assert_allclose(np.diag(found), np.diag(drawn), rtol=0.2)
+    size = np.sqrt(np.diag(drawn))
+    np.testing.assert_allclose(found / np.outer(size, size), drawn / np.outer(size, size), atol=0.2)
 
 
 def _any(value: object) -> Any:
