@@ -30,7 +30,7 @@ BIN = Path(sys.executable).parent
 PYTHON = sys.executable
 
 # A stage keeps one core busy and waits now and then, for a device's silence or a bus in real time.
-# Four at a time at the most: each may take 0.7 GB.
+# Four at a time at the most: each may take 0.7 GB, types 2.2.
 WORKERS = min(4, 1 + (os.cpu_count() or 1))
 TAIL_LINES = 40
 SLOWEST = 20

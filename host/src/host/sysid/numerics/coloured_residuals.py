@@ -38,26 +38,10 @@ def coloured_score_covariance(residual: Array, sensitivities: Array) -> Array:
     size = 1 << int(2 * samples - 1).bit_length()
     power = np.abs(np.fft.rfft(residual, size)) ** 2
     correlation = np.fft.irfft(power, size)[: lags + 1] / samples
-    return correlated_score_covariance(correlation, sensitivities)
-
-
-def correlated_score_covariance(correlation: Array, sensitivities: Array) -> Array:
-    """Return S' R S of a known autocorrelation R, zero beyond its last lag.
-
-    Parameters
-    ----------
-    correlation : Array, shape (lags + 1,)
-        From lag 0; fewer lags than samples.
-    sensitivities : Array, shape (samples, columns)
-    """
-    samples, lags = len(sensitivities), len(correlation) - 1
-    size = 1 << int(2 * samples - 1).bit_length()
     window = np.zeros(size)
     window[: lags + 1] = correlation
     window[size - lags :] = correlation[:0:-1]
     # A symmetric window has a real spectrum.
     weight = np.fft.rfft(window).real[:, None]
-    correlated = np.fft.irfft(np.fft.rfft(sensitivities, size, axis=0) * weight, size, axis=0)[
-        :samples
-    ]
-    return np.asarray(sensitivities.T @ correlated, dtype=np.float64)
+    moved = np.fft.irfft(np.fft.rfft(sensitivities, size, axis=0) * weight, size, axis=0)[:samples]
+    return np.asarray(sensitivities.T @ moved, dtype=np.float64)

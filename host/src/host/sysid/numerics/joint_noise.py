@@ -25,7 +25,7 @@ ROUNDS = 5  # of parameters in the noise, and noise without what they took
 
 @dataclass(frozen=True, slots=True)
 class JointNoise:
-    """Noise e[k] = A1 e[k-1] + ... + w[k] of p outputs, w white.
+    """Noise e[k] = A1 e[k-1] + ... + w[k] of p outputs, w white (EQUATIONS.md, eq. 27).
 
     Attributes
     ----------
