@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 
 FAINT = 0.2  # of an input: a weaker one of another surface is the pilot's, and ends no response
-WEAKER = 0.5  # of an input that it overlaps: a stronger one is no echo, nor a pilot's handling
+WEAKER = 0.6  # of an input that it overlaps: a stronger one is no echo, nor a pilot's handling
 FULL_RAD = 0.2  # the surface that full throttle counts as
 # Which way a hand that levels moves a surface, from the jump on with which it takes over.
 LEVELLING = {"elevator_rad": ("theta_rad", 1.0), "aileron_rad": ("phi_rad", -1.0)}
