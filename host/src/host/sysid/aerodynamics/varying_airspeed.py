@@ -237,8 +237,7 @@ class VaryingModel:
                 own = own * ratio**power * self._change_of_lift(columns, ratio, dt_s)
             elif by == "alpha":
                 own = own * _deviation(columns["alpha_rad"])
-            held = column in self.base.inputs
-            found.append(_deviation(own) if held else self._moving(_deviation(own)))
+            found.append(self._moving(_deviation(own)))
         return found
 
     def _change_of_lift(self, columns: Mapping[str, Array], ratio: Array, dt_s: float) -> Array:
@@ -358,8 +357,9 @@ def mean_normal(cuts: Sequence[Mapping[str, Array]], trim: Trim) -> float:
         All columns of each maneuver.
     trim : Trim
     """
-    every = [_normal(c) * (trim.airspeed_mps / c["airspeed_mps"]) ** 2 for c in cuts]
-    return float(np.mean(np.concatenate(every)))
+    normal = np.concatenate([_normal(c) for c in cuts])
+    airspeed = np.concatenate([c["airspeed_mps"] for c in cuts])
+    return float(np.mean(normal) * trim.airspeed_mps**2 / np.mean(airspeed**2))
 
 
 def _normal(columns: Mapping[str, Array]) -> Array:

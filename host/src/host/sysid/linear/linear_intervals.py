@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
 from host.instrument.deviations import airspeed_share, dynamic_pressure_share, unknown_sensors
@@ -33,8 +31,8 @@ from host.sysid.linear.linear_stages import LinearEstimate, LinearIntervals
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.uncertainty import Uncertainty
-from host.sysid.numerics.input_coherence import InputCoherence, driven_data, input_coherence
-from host.sysid.numerics.joint_noise import JointNoise, joint_noise
+from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
+from host.sysid.numerics.joint_noise import noise_of_outputs
 from host.sysid.numerics.maneuver_agreement import disagreement, maneuver_agreement
 from host.sysid.numerics.score_variance import white_fit_covariance
 from host.sysid.reconstruction.flight_path import PITOT
@@ -83,8 +81,11 @@ def _statistical(e: LinearEstimate) -> tuple[FitResult, InputCoherence | None]:
     """
     at_trim = e.at_trim(e.estimate)  # airspeed that varied is known: what it does is no model error
     free = free_responses(e.found.model, e.estimate, at_trim)
-    coherence = None if free is None else _coherence(e, free)
-    known = _with_model_error(e, _noise(e, free, coherence), free, coherence)
+    errors = [] if free is None else _known_errors(e, free)
+    coherence = None
+    if free is not None:
+        coherence = input_coherence(free.problem, free.responses, free.theta, nuisance=errors)
+    known = _with_model_error(e, _noise(e, free, errors), free, coherence)
     result = replace(
         e.fit,
         estimate=e.estimate,
@@ -97,15 +98,13 @@ def _statistical(e: LinearEstimate) -> tuple[FitResult, InputCoherence | None]:
     return result, coherence
 
 
-def _noise(
-    e: LinearEstimate, free: FreeResponses | None, coherence: InputCoherence | None
-) -> Uncertainty:
+def _noise(e: LinearEstimate, free: FreeResponses | None, errors: Sequence[Array]) -> Uncertainty:
     """Return what noise leaves open: of the method, with a memory, and of columns that drive."""
     known = replace(e.noise, warnings=())
     # Before maneuvers are compared: by noise without memory a gust made them disagree.
-    if free is not None and coherence is not None and e.fit.method == WHITE:
-        together = _joint_noise(e, free)
-        known = widened_to(known, white_fit_covariance(free.problem, free.responses, together))
+    if free is not None and e.fit.method == WHITE:
+        noise = noise_of_outputs(free.problem, free.responses, free.theta, errors)
+        known = widened_to(known, white_fit_covariance(free.problem, free.responses, noise))
     return known.plus(column_noise(e.fit, e.found.maneuvers, e.trim))
 
 
@@ -121,22 +120,6 @@ def _with_model_error(
     return noise.with_model_error(
         [disagreement(scatter), driven_by_inputs(e.fit, noise, coherence, excess)]
     )
-
-
-def _joint_noise(e: LinearEstimate, free: FreeResponses) -> JointNoise:
-    """Return the noise of all outputs, without what inputs drive and known errors do."""
-    problem = free.problem
-    data = driven_data(problem, free.responses, _known_errors(e, free))
-    ones = np.ones(data[0].slopes[0].shape[1] - len(problem.names))
-    prior = np.concatenate([problem.prior_precision, ones])
-    pulled = problem.prior_precision * (problem.prior_mean - free.theta)
-    return joint_noise(data, prior, np.concatenate([pulled, 0.0 * ones]), problem.least_variance)
-
-
-def _coherence(e: LinearEstimate, free: FreeResponses) -> InputCoherence:
-    """Return what the inputs drive outside the model and what the instrument's file leaves open."""
-    known = _known_errors(e, free)
-    return input_coherence(free.problem, free.responses, free.theta, nuisance=known)
 
 
 def _known_errors(e: LinearEstimate, free: FreeResponses) -> list[Array]:

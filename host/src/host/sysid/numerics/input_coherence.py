@@ -178,9 +178,7 @@ def input_coherence(
     """
     data = driven_data(problem, responses, nuisance, block_s)
     count = len(problem.names)
-    own_prior, known = problem.prior_precision, data[0].slopes[0].shape[1] - count
-    prior = np.concatenate([own_prior, np.ones(known)])
-    pulled = np.concatenate([own_prior * (problem.prior_mean - theta), np.zeros(known)])
+    prior, pulled = prior_of(problem, theta, data)
     noise = [ArNoise.white() for _ in data]
     variance = np.array([np.mean(np.concatenate(d.residuals) ** 2) for d in data])
     variance = np.maximum(variance, problem.least_variance)
@@ -241,7 +239,7 @@ def input_coherence(
         signature=replace(signature, shift=signature.shift[:count]),
         samples=sum(len(e) for e in data[0].residuals),
         information=every[:, :count, :count],
-        prior_precision=own_prior,
+        prior_precision=problem.prior_precision,
     )
 
 
@@ -286,6 +284,25 @@ def driven_data(
             extra.append(block_means(added[number], block, seen))
         found.append(OutputData(residuals, slopes, extra))
     return _with_what_shows(found, size, problem.least_variance)
+
+
+def prior_of(
+    problem: OutputProblem, theta: Array, data: Sequence[OutputData]
+) -> tuple[Array, Array]:
+    """Return the precision of parameters and known errors, and its pull on an estimate, (P + k,).
+
+    Known errors are in deviations, about none.
+
+    Parameters
+    ----------
+    problem : OutputProblem
+    theta : Array, shape (P,)
+    data : sequence of OutputData
+        Of `driven_data`.
+    """
+    own, known = problem.prior_precision, data[0].slopes[0].shape[1] - len(problem.names)
+    pulled = np.concatenate([own * (problem.prior_mean - theta), np.zeros(known)])
+    return np.concatenate([own, np.ones(known)]), pulled
 
 
 def _with_what_shows(data: list[OutputData], count: int, least_variance: Array) -> list[OutputData]:
