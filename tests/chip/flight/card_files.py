@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import json
+import mmap
+import re
+import struct
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
+
+from host.wire.extents import data_extents
 
 BLOCK = 512
 
@@ -26,12 +31,50 @@ def list_files(image: Path) -> list[str]:
     return [line.strip().removeprefix("::/") for line in lines if line.strip()]
 
 
-def read_file(image: Path, name: str, target: Path) -> bytes:
-    """Copy a file out, through directory and FAT, and give its content."""
-    subprocess.run(
-        ["mcopy", "-o", "-i", str(image), f"::{name}", str(target)], capture_output=True, check=True
-    )
-    return target.read_bytes()
+def copy_out(image: Path, name: str, target: Path) -> Path:
+    """Copy a file out through directory and FAT as mtools reads them; holes of the image stay.
+
+    mcopy filled them: the firmware prepares 128 MB for a flight, of which a case writes one.
+
+    Raises
+    ------
+    subprocess.CalledProcessError
+        If mtools finds no such file.
+    """
+    stem, _, extension = name.partition(".")
+    listed = re.search(rf"^{stem:<8} {extension:<3} +(\d+) ", _said("mdir", image, name), re.M)
+    if listed is None:
+        raise AssertionError(f"mdir gives no size of {name}")
+    size = int(listed[1])
+    with image.open("rb", buffering=0) as card, target.open("wb", buffering=0) as out:
+        cluster_blocks, reserved, fats = struct.unpack_from("<BHB", boot := card.read(BLOCK), 13)
+        first_lba = reserved + fats * int.from_bytes(boot[36:40], "little") - 2 * cluster_blocks
+        done, filled = 0, data_extents(card, image.stat().st_size)
+        for run in re.finditer(r"<(\d+)(?:-(\d+))?>", _said("mshowfat", image, name)):
+            first, last = int(run[1]), int(run[2] or run[1])
+            begin, end = ((first_lba + at * cluster_blocks) * BLOCK for at in (first, last + 1))
+            for start, stop in filled:
+                if (low := max(start, begin)) < (high := min(stop, end)):
+                    card.seek(low)
+                    out.seek(done + low - begin)
+                    out.write(card.read(high - low))
+            done += end - begin
+        out.truncate(size)
+    return target
+
+
+def _said(program: str, image: Path, name: str) -> str:
+    """Return what a program of mtools says of a file."""
+    command = [program, "-i", str(image), f"::{name}"]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def read_file(image: Path, name: str, target: Path) -> bytes | mmap.mmap:
+    """Copy a file out and give its content."""
+    if copy_out(image, name, target).stat().st_size == 0:
+        return b""
+    with target.open("rb") as file:
+        return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
 
 
 def put_file(image: Path, name: str, content: bytes) -> None:

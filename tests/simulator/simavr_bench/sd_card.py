@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from simavr_bench.chip import Chip, cycles
 from simavr_bench.library import SdCounters, SdSettings
 from simavr_bench.pins import pin_number
@@ -174,6 +177,15 @@ class SdCard:
     def block(self, number: int, count: int = 1) -> bytes:
         """Content of blocks."""
         return self._memory[number * BLOCK : (number + count) * BLOCK]
+
+    def changed_pages(self) -> NDArray[np.bool_]:
+        """Tell which pages of a card with `in_place` false are no longer those of its image."""
+        words = -(-len(self._memory) // mmap.PAGESIZE)
+        with Path("/proc/self/pagemap").open("rb") as pages:
+            pages.seek(8 * (ct.addressof(self._buffer) // mmap.PAGESIZE))
+            entries = np.frombuffer(pages.read(8 * words), "<u8")
+        # proc(5): 63 in memory, 62 swapped out, 61 of a file.
+        return np.asarray((entries >> 62 != 0) & (entries >> 61 & 1 == 0))
 
     def put(self, number: int, content: bytes) -> None:
         """Change blocks as another computer does, the card being out."""
