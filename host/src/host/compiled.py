@@ -48,10 +48,18 @@ class Kernel(Generic[Arguments, Result]):
         Let the compiler reorder sums.
     part : bool
         Only other kernels are worth compiling it for; called from Python it is Python.
+    by_arrays : callable, optional
+        The same without its loops, for kernels that run as Python: what numba takes long to compile
+        is quick there.
     """
 
     def __init__(
-        self, function: Callable[Arguments, Result], *, reordered: bool, part: bool = False
+        self,
+        function: Callable[Arguments, Result],
+        *,
+        reordered: bool,
+        part: bool = False,
+        by_arrays: Callable[Arguments, Result] | None = None,
     ) -> None:
         functools.update_wrapper(self, function)
         self.function: Any = function
@@ -59,6 +67,7 @@ class Kernel(Generic[Arguments, Result]):
         self.place = f"{function.__module__} {self.function.__qualname__}"
         self._reordered = reordered
         self._run: Any = function if part else None
+        self._by_arrays = by_arrays
         self._machine: Any = None
         self._kept: Path | None = None
 
@@ -67,7 +76,7 @@ class Kernel(Generic[Arguments, Result]):
         if self._run is None and has_compiler():
             self._run = self.machine(said=True)
         elif self._run is None:
-            self._run = self.function
+            self._run = self.plain()
             say_if_slow()
         try:
             result: Result = self._run(*arguments, **named)
@@ -109,13 +118,17 @@ class Kernel(Generic[Arguments, Result]):
             fresh = self._kept is None or not any(self._kept.rglob("*.nbc"))
             if said and fresh:
                 _say_compiling(self.name, compiling_s(self))
-            self._machine = _jit(self._linked(), self._reordered, self._kept)
+            self._machine = _jit(self._linked(Kernel.machine), self._reordered, self._kept)
         return self._machine
 
-    def _linked(self) -> FunctionType:
-        """Return the function with the machine code of the kernels that it calls."""
+    def plain(self) -> Any:
+        """Return it as Python, by arrays if it may be; what it calls are functions, no kernels."""
+        return self._by_arrays or self._linked(Kernel.plain)
+
+    def _linked(self, form: Callable[[Kernel[..., Any]], Any]) -> FunctionType:
+        """Return the function with each kernel that it calls in a form of it."""
         own = self.function
-        places = own.__globals__ | {name: k.machine() for name, k in _called(own)}
+        places = own.__globals__ | {name: form(k) for name, k in _called(own)}
         linked = FunctionType(own.__code__, places, own.__name__, own.__defaults__, own.__closure__)
         linked.__module__, linked.__qualname__ = own.__module__, own.__qualname__
         return linked
@@ -143,6 +156,13 @@ def compiled_fast(function: Callable[Arguments, Result]) -> Kernel[Arguments, Re
 def compiled_part(function: Callable[Arguments, Result]) -> Kernel[Arguments, Result]:
     """Do the same as `compiled_fast` for what kernels call; called from Python it stays Python."""
     return Kernel(function, reordered=True, part=True)
+
+
+def part_by_arrays(
+    by_arrays: Callable[Arguments, Result],
+) -> Callable[[Callable[Arguments, Result]], Kernel[Arguments, Result]]:
+    """Do the same, and run `by_arrays` in its place where the kernels that call it are Python."""
+    return functools.partial(Kernel, reordered=True, part=True, by_arrays=by_arrays)
 
 
 _preferred = False

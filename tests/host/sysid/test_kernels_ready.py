@@ -5,12 +5,14 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from host.aircraft import propulsion
 from host.aircraft.powerplant import powerplant
-from host.sysid.numerics import recursion
+from host.compiled import Kernel
+from host.sysid.numerics import equation_recursion, recursion
 
 STUDIES = Path(__file__).parents[3] / "host"
 METHODS = """
@@ -117,6 +119,26 @@ def test_slopes_by_pieces_and_by_machine_code_agree(
         np.testing.assert_allclose(found[0][:, k], C @ S, rtol=1e-9, atol=1e-9)
         S = step[:, :n] @ S + np.einsum("c,icq->iq", z[k], slopes)
     np.testing.assert_allclose(found[0], found[1], rtol=1e-9, atol=1e-9)
+
+
+def test_parts_of_equations_by_arrays_are_their_loops() -> None:
+    rng = np.random.default_rng(2)
+    a, b, c, d, e = rng.standard_normal((5, 4, 4))
+    column = np.array([2, -1, 0, 2])
+    given: dict[str, tuple[Any, ...]] = {
+        "multiply": (a, b, c), "add_columns": (a, column, b), "begin_step": (a, b, c),
+        "add_rates": (a, 2.0, 0.3, b, c, d), "add_times": (0.7, a, e),
+    }  # fmt: skip
+    kernels = {n: k for n, k in vars(equation_recursion).items() if isinstance(k, Kernel)}
+    assert set(given) == {n for n, k in kernels.items() if k.plain().__name__ != n}
+    for name, arguments in given.items():
+        left = []
+        for form in (kernels[name].function, kernels[name].plain()):
+            copies = [x.copy() if isinstance(x, np.ndarray) else x for x in arguments]
+            form(*copies)
+            left.append(copies)
+        for loops, arrays in zip(*left, strict=True):
+            np.testing.assert_allclose(arrays, loops, rtol=1e-12, err_msg=name)
 
 
 def test_a_rotor_in_python_and_as_machine_code_agree(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.compiled import compiled_part
+from host.compiled import compiled_part, part_by_arrays
 from host.sysid.expressions.equation_code import of_equations
 from host.sysid.numerics.recursion import STATE_LIMIT
 
@@ -97,7 +97,11 @@ def reading_slopes(
     raise NotImplementedError
 
 
-@compiled_part
+def _multiply(a: Array, b: Array, out: Array) -> None:
+    out[...] = a @ b
+
+
+@part_by_arrays(_multiply)
 def multiply(a: Array, b: Array, out: Array) -> None:
     """Write a b into `out`; of so small matrices a tenth of what `numpy.dot` takes."""
     for i in range(a.shape[0]):
@@ -164,7 +168,12 @@ def add_jumps(
             S[i, input_column[j]] += work[0, i] - work[1, i]
 
 
-@compiled_part
+def _add_columns(by: Array, column: IntArray, out: Array) -> None:
+    for b in np.flatnonzero(column >= 0):
+        out[:, column[b]] += by[:, b]
+
+
+@part_by_arrays(_add_columns)
 def add_columns(by: Array, column: IntArray, out: Array) -> None:
     """Add the columns of slopes `by` (rows, q) to those of the unknowns that they belong to."""
     for b in range(len(column)):
@@ -195,7 +204,14 @@ def take_stage_inputs(
         slope[j] = ramp * (by_delay[k, j] + share * (by_delay[k + 1, j] - by_delay[k, j]))
 
 
-@compiled_part
+def _begin_step(begin: Array, x: Array, sum_: Array) -> None:
+    if begin.shape[1] == 1:  # of the states alone loops are quicker
+        begin_step.function(begin, x, sum_)
+    else:
+        x[...], sum_[...] = begin, 0.0
+
+
+@part_by_arrays(_begin_step)
 def begin_step(begin: Array, x: Array, sum_: Array) -> None:
     """Write the begin of a step (n, ...) into `x`, and no rates into their sum.
 
@@ -207,7 +223,17 @@ def begin_step(begin: Array, x: Array, sum_: Array) -> None:
             sum_[i, j] = 0.0
 
 
-@compiled_part
+def _add_rates(
+    rate: Array, weight: float, ahead: float, begin: Array, sum_: Array, x: Array
+) -> None:
+    if rate.shape[1] == 1:
+        add_rates.function(rate, weight, ahead, begin, sum_, x)
+    else:
+        sum_ += weight * rate
+        x[...] = begin + ahead * rate
+
+
+@part_by_arrays(_add_rates)
 def add_rates(
     rate: Array, weight: float, ahead: float, begin: Array, sum_: Array, x: Array
 ) -> None:
@@ -218,7 +244,14 @@ def add_rates(
             x[i, j] = begin[i, j] + ahead * rate[i, j]
 
 
-@compiled_part
+def _add_times(factor: float, of: Array, out: Array) -> None:
+    if of.shape[1] == 1:
+        add_times.function(factor, of, out)
+    else:
+        out += factor * of
+
+
+@part_by_arrays(_add_times)
 def add_times(factor: float, of: Array, out: Array) -> None:
     """Add an array (n, ...) so many times."""
     for i in range(out.shape[0]):
@@ -291,7 +324,8 @@ def run_equations(
             end = end_of_step(position, (whole + 1.0) / substeps, shift, ramp)
             h = (end - position) * dt_s
             begin_step(state, stage, total)
-            begin_step(S, T, total_S)
+            if L > 0:
+                begin_step(S, T, total_S)
             for number in range(4):
                 weight, late, ahead = STAGES[number]
                 share = position + late * (end - position)
@@ -306,14 +340,17 @@ def run_equations(
                     add_columns(fp, column, K)
                     add_scaled(fu, slope, input_column, K)
                     add_ones(bias_column, K)
+                    add_rates(K, weight, ahead * h, S, total_S, T)
                 for i in range(n):
                     f[i, 0] += bias[i]
                 add_rates(f, weight, ahead * h, state, total, stage)
-                add_rates(K, weight, ahead * h, S, total_S, T)
             add_times(h / 6.0, total, state)
-            add_times(h / 6.0, total_S, S)
-            if ramp == 0.0 and L > 0:
-                add_jumps(state[:, 0], k + end, held, shift, input_column, p, c, t, S, work, after)
+            if L > 0:
+                add_times(h / 6.0, total_S, S)
+                if ramp == 0.0:
+                    add_jumps(
+                        state[:, 0], k + end, held, shift, input_column, p, c, t, S, work, after
+                    )
             whole += 1 if end == (whole + 1.0) / substeps else 0
             position = end
     return True
