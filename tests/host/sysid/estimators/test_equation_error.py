@@ -125,21 +125,6 @@ def test_middle_of_the_sandwich_is_that_of_direct_sums(samples: int) -> None:
     )
 
 
-def test_units_of_a_state_do_not_matter() -> None:
-    maneuver = with_rates(5, snr=100.0)
-    plain = fit("equation-error", navion_free(), [maneuver])
-    turn = np.diag([3.6, 57.3, 57.3, 57.3])
-    scaled = Maneuver(
-        maneuver.dt_s,
-        maneuver.inputs * 57.3,
-        maneuver.outputs @ turn,
-        rates=np.asarray(maneuver.rates) @ turn,
-    )
-    A, B, _, _ = fit("equation-error", navion_free(), [scaled]).matrices()
-    np.testing.assert_allclose(np.linalg.inv(turn) @ A @ turn, plain.matrices()[0], rtol=1e-6)
-    np.testing.assert_allclose(np.linalg.inv(turn) @ B * 57.3, plain.matrices()[1], rtol=1e-6)
-
-
 def test_differentiated_states_recover_the_structured_model() -> None:
     u, y = clean(0.01)
     result = fit("equation-error", navion_structured(), [Maneuver(0.01, u, y)], bandwidth=8.0)

@@ -10,7 +10,6 @@ from host.aircraft.mass_properties import Condition
 from host.sysid.estimators.filter_error import information_at
 from host.sysid.estimators.gust_model import ROLL_GUST
 from host.sysid.numerics import FilterProblem
-from host.sysid.numerics.process_noise import discrete_noise
 from scipy import linalg
 from studies.gusts import AXES, DT_S, fly, gusty_aircraft, spectrum
 from studies.turbulence import PROCESS, fitted_model, run_case, true_vector
@@ -44,18 +43,6 @@ def test_coefficients_are_what_conversion_by_hand_says() -> None:
     inertia = np.array([[a.ixx_kgm2, -a.ixz_kgm2], [-a.ixz_kgm2, a.izz_kgm2]])
     rolling = np.linalg.solve(inertia, [force * a.span_m**2 / (2.0 * V), 0.0])
     assert [gains["L_p"]["Cl_p"], gains["N_p"]["Cl_p"]] == pytest.approx(list(rolling))
-
-
-def test_discrete_noise_is_the_integral() -> None:
-    rng = np.random.default_rng(5)
-    A, power = 8.0 * rng.standard_normal((4, 4)), np.array([0.0, 1.0, 0.3, 0.0])
-    F, Q = discrete_noise(A, power, 0.02)
-    times = (np.arange(2000) + 0.5) * 1e-5
-    exact = sum(linalg.expm(A * t) @ np.diag(power) @ linalg.expm(A * t).T for t in times) * 1e-5
-    np.testing.assert_allclose(F, linalg.expm(0.02 * A), rtol=1e-10)
-    np.testing.assert_allclose(Q, exact, rtol=1e-4, atol=1e-9)
-    trapezoid = 0.01 * (np.diag(power) + F @ np.diag(power) @ F.T)
-    assert np.max(np.abs(trapezoid - exact)) > 10.0 * np.max(np.abs(Q - exact))
 
 
 @pytest.mark.parametrize("axis", list(AXES))

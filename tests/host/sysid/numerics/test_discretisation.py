@@ -3,11 +3,10 @@
 import warnings
 
 import numpy as np
-import pytest
 from host.sysid.models import LinearModel, Maneuver, Parameter, Term
 from host.sysid.models.state_space_model import DelayGroup
 from host.sysid.numerics import OutputProblem, discretise
-from host.sysid.numerics.ar_noise import ArNoise, ar_filter, autocovariance
+from host.sysid.numerics.ar_noise import autocovariance
 from host.sysid.numerics.fractional_delay import delay_columns, slope_by_delay
 from host.sysid.numerics.process_noise import discrete_noise
 from scipy import linalg
@@ -68,23 +67,6 @@ def test_delay_of_a_cubic_is_exact_and_its_slope_too() -> None:
         t = time - shift
         np.testing.assert_allclose(late[:, 0], 0.1 * t**3 - t**2 + 3.0, rtol=1e-10, atol=1e-9)
         np.testing.assert_allclose(slope[:, 0], -(0.3 * t**2 - 2.0 * t), rtol=1e-9, atol=1e-8)
-
-
-def test_whitening_turns_the_ar_covariance_into_the_identity() -> None:
-    coefficient = np.array([1.2, -0.6, 0.1])
-    memory = ArNoise.from_coefficient(coefficient)
-    samples = 12
-    covariance = np.array(
-        [
-            [autocovariance(coefficient, samples)[abs(i - j)] for j in range(samples)]
-            for i in range(samples)
-        ]
-    )
-    whitener = ar_filter(np.eye(samples), coefficient, memory.start_whitener)
-    np.testing.assert_allclose(whitener @ covariance @ whitener.T, np.eye(samples), atol=1e-10)
-    sign, log_determinant = np.linalg.slogdet(covariance)
-    assert sign > 0
-    assert memory.log_determinant() == pytest.approx(log_determinant, abs=1e-9)
 
 
 def test_noise_of_poles_next_to_one_has_a_positive_variance() -> None:
