@@ -4,6 +4,7 @@ import subprocess
 import sys
 import tempfile
 import tomllib
+from collections.abc import Callable
 from itertools import starmap
 from pathlib import Path
 
@@ -43,11 +44,11 @@ print(fdm["velocities/q-rad_sec"])
 
 
 @pytest.fixture(scope="module")
-def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def saved(tmp_path_factory: pytest.TempPathFactory, simulated: Callable[[str, int], Path]) -> Path:
     """A flight, its answer as two files, and a flight of the answer."""
     folder = tmp_path_factory.mktemp("export")
     quiet = ["--firmware", "none", "--no-picture"]
-    assert main(["simulate", "calm", *quiet, "--seed", "4", "-o", str(folder / "one")]) == 0
+    (folder / "one").symlink_to(simulated("calm", 4))
     again, xml = folder / "again.toml", folder / "aircraft/identified/identified.xml"
     xml.parent.mkdir(parents=True)
     flags = ["--aircraft", "ultrastick25e", "--no-corrections", "--method", METHOD]

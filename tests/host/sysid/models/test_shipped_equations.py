@@ -158,7 +158,7 @@ def test_flight_path_needs_no_surface() -> None:
 def test_its_slopes_are_those_of_differences(name: str) -> None:
     model = shipped(name)
     rng = np.random.default_rng(2)
-    samples = 12
+    samples = 8
     typical = {"airspeed_mps": 16.0, "thrust_n": 3.0, "az_mps2": -G}
     mean = np.array([typical.get(u, 0.02) for u in model.inputs])
     u = mean * (1.0 + 0.1 * rng.standard_normal((samples, len(mean))))

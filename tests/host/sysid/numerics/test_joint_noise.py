@@ -13,14 +13,17 @@ COVARIANCE = np.array([[0.04, 0.03], [0.03, 0.09]])
 NOISE = JointNoise(np.array([A1, A2]), COVARIANCE)
 
 
-def drawn(samples: int, seed: int) -> tuple[Array, Array]:
-    """Return noise that begins at rest, (samples, 2), and its innovations in their deviations."""
-    w = np.random.default_rng(seed).standard_normal((samples, 2))
-    n = np.zeros((samples, 2))
+def drawn(samples: int, *seeds: int) -> tuple[Array, Array]:
+    """Return noise that begins at rest, (samples, 2) of each seed, and its innovations.
+
+    These are in their deviations.
+    """
+    w = np.array([np.random.default_rng(s).standard_normal((samples, 2)) for s in seeds])
+    n = np.zeros_like(w)
     for k in range(samples):
-        n[k] = np.linalg.cholesky(COVARIANCE) @ w[k]
-        n[k] += (A1 @ n[k - 1] if k > 0 else 0.0) + (A2 @ n[k - 2] if k > 1 else 0.0)
-    return n, w
+        n[:, k] = w[:, k] @ np.linalg.cholesky(COVARIANCE).T
+        n[:, k] += (n[:, k - 1] @ A1.T if k > 0 else 0.0) + (n[:, k - 2] @ A2.T if k > 1 else 0.0)
+    return (n, w) if len(seeds) > 1 else (n[0], w[0])
 
 
 def of_records(records: list[Array]) -> JointNoise:
@@ -60,7 +63,7 @@ def test_score_by_innovations() -> None:
 
 
 def test_power_is_that_of_draws() -> None:
-    last = np.array([drawn(60, seed)[0][-1] for seed in range(3000)])
+    last = drawn(60, *range(3000))[0][:, -1]
     np.testing.assert_allclose(NOISE.power(60), np.mean(last**2, axis=0), rtol=0.1)
 
 

@@ -15,7 +15,7 @@ from host.sysid.models import Maneuver, Trim, template
 from host.sysid.numerics import output_problem
 from host.sysid.numerics.joint_noise import JointNoise, noise_of_outputs
 from host.sysid.numerics.score_variance import white_fit_covariance
-from scipy import signal
+from scipy import linalg, signal
 
 SAMPLES, DRAWS = 400, 600
 MEMORY = (np.array([0.9]), np.array([1.5, -0.7]))
@@ -126,20 +126,32 @@ def doublets(surface: int) -> Array:
 INPUTS = [doublets(0), doublets(0), doublets(1), doublets(1)]
 
 
-def flown(u: Array, rng: np.random.Generator) -> Array:
-    """Return the outputs of a maneuver in gusts of 0.3 m/s, which turn and roll the air too."""
-    A, B, C, D = BASE.matrices(THETA)
-    still, _, seen, _ = BASE.matrices(np.zeros(len(THETA)))
+def wind(rng: np.random.Generator) -> Array:
+    """Return sideslip, roll and yaw rate of gusts of 0.3 m/s that turn and roll the air too."""
     noise = rng.standard_normal(((BEFORE + ROWS) * 10, 4))
     air = turbulence(Air(turbulence_mps=0.3), 60.0)
     drawn = gusts(air, noise, V_MPS, SPAN_M, DT_S / 10)[::10]
-    wind = np.column_stack([drawn[:, 1] / V_MPS, -drawn[:, 3], -drawn[:, 5]])
+    return np.column_stack([drawn[:, 1] / V_MPS, -drawn[:, 3], -drawn[:, 5]])
+
+
+def flown(u: Array, winds: Array) -> Array:
+    """Return the outputs of maneuvers, one for each wind; winds (n, samples, 3)."""
+    A, B, C, D = BASE.matrices(THETA)
+    still, _, seen, _ = BASE.matrices(np.zeros(len(THETA)))
     felt, measured = (A - still)[:, :3], (C - seen)[:, :3]  # by beta, p, r of the air
     measured[0, 0] = 1.0  # the vane
-    system = (A, np.hstack([B, felt]), C, np.hstack([D, measured]))
-    driven = np.column_stack([np.vstack([np.zeros((BEFORE, 2)), u]), wind])
-    _, y, _ = signal.lsim(system, driven, np.arange(BEFORE + ROWS) * DT_S)
-    return np.asarray(y[BEFORE:])
+    surfaces = np.broadcast_to(np.vstack([np.zeros((BEFORE, 2)), u]), (*winds.shape[:2], 2))
+    driven = np.concatenate([surfaces, winds], axis=2)
+    whole = np.zeros((len(A) + 10, len(A) + 10))  # lines from sample to sample
+    whole[: len(A), : len(A)], whole[: len(A), len(A) : -5] = A, np.hstack([B, felt])
+    whole[len(A) : -5, -5:] = np.eye(5) / DT_S
+    ahead = linalg.expm(DT_S * whole)[: len(A)].T
+    x = np.zeros((BEFORE + ROWS, len(winds), len(A)))
+    for k in range(len(x) - 1):
+        here, change = driven[:, k], driven[:, k + 1] - driven[:, k]
+        x[k + 1] = np.hstack([x[k], here, change]) @ ahead
+    y = x.swapaxes(0, 1) @ C.T + driven @ np.hstack([D, measured]).T
+    return np.asarray(y[:, BEFORE:])
 
 
 def test_the_covariance_of_a_white_fit_is_that_of_drawn_gusts() -> None:
@@ -148,7 +160,9 @@ def test_the_covariance_of_a_white_fit_is_that_of_drawn_gusts() -> None:
     for seed in range(8):
         rng = np.random.default_rng(seed)
         data = [
-            Maneuver(DT_S, u, flown(u, rng) + SENSORS * rng.standard_normal((ROWS, 5)))
+            Maneuver(
+                DT_S, u, flown(u, wind(rng)[None])[0] + SENSORS * rng.standard_normal((ROWS, 5))
+            )
             for u in INPUTS
         ]
         found = fit("output-error-white", BASE, data, multiple_starts=False)
@@ -167,10 +181,10 @@ def test_the_covariance_of_a_white_fit_is_that_of_drawn_gusts() -> None:
         information[np.ix_(own, own)] += np.einsum("tja,j,tjb->ab", J, weight, J)
     inverse = np.linalg.inv(information)
     steps = np.zeros((150, len(inverse)))
-    for step, rng in zip(steps, np.random.default_rng(99).spawn(len(steps)), strict=True):
-        for k, J in enumerate(slopes):
-            noise_alone = flown(np.zeros((ROWS, 2)), rng)
-            step[problem.columns(k)] += np.einsum("tja,j,tj->a", J, weight, noise_alone)
+    winds = [[wind(rng) for _ in slopes] for rng in np.random.default_rng(99).spawn(len(steps))]
+    for k, J in enumerate(slopes):
+        noise_alone = flown(np.zeros((ROWS, 2)), np.array([one[k] for one in winds]))
+        steps[:, problem.columns(k)] += np.einsum("tja,j,ntj->na", J, weight, noise_alone)
     drawn = np.mean((steps @ inverse) ** 2, axis=0)[at]
     ratio = np.sqrt(np.mean(stated, axis=0) / drawn)
     np.testing.assert_allclose(ratio, 1.0, atol=0.25)

@@ -59,14 +59,17 @@ def test_it_says_what_the_verb_says(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    models = [word for name in MODELS for word in ("--model", name)]
-    options = ["identify", str(flights[0] / "flight.csv"), "--aircraft", NAME, *models]
-    assert main([*options, "--json"]) == 0
-    assert capsys.readouterr().out.rstrip("\n") == one.to_json()
-    # The same call again: what it prints is asked, not a second time what it finds.
+    source = flights[0] / "flight.csv"
+    quick = host.identify(source, aircraft=NAME, models="short-period", methods="equation-error")
+    options = ["identify", str(source), "--aircraft", NAME]
+    found = ["--model", "short-period", "--method", "equation-error", "--json"]
+    assert main([*options, *found]) == 0
+    assert capsys.readouterr().out.rstrip("\n") == quick.to_json()
+    # What it prints of all models is asked, not a second time what it finds.
     monkeypatch.setattr("host.sysid.pipeline.stages.identify", lambda *_, **__: one)
-    assert main(options) == 0
-    assert capsys.readouterr().out.rstrip("\n") == str(one)
+    for more, said in (("--full", one.to_text()), ("--json", one.to_json()), (None, str(one))):
+        assert main([*options, *([more] if more else [])]) == 0
+        assert capsys.readouterr().out.rstrip("\n") == said
 
 
 def test_the_table_has_every_estimate_with_its_unit(one: Identification) -> None:

@@ -50,10 +50,11 @@ def recorded(seed: int, shift: float = 1.0, noise: float = 3e-4) -> pd.DataFrame
     return pd.DataFrame(columns | {"alpha_rad": x[:, 0], "q_radps": x[:, 1]})
 
 
-@pytest.fixture
-def saved(tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A model saved by `host identify` from one record."""
-    source, path = tmp_path / "one.csv", tmp_path / "model.toml"
+    folder = tmp_path_factory.mktemp("saved")
+    source, path = folder / "one.csv", folder / "model.toml"
     recorded(1).to_csv(source, index=False)
     words = ["identify", str(source), "--model", "short-period", "--no-delays"]
     assert main([*words, "--save-model", str(path)]) == 0
@@ -334,7 +335,7 @@ def test_derivatives_that_nobody_estimated_are_said(tmp_path: Path) -> None:
 def test_files_in_the_wrong_order_or_empty_are_one_line(
     saved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    record, empty = tmp_path / "one.csv", tmp_path / "empty.toml"
+    record, empty = saved.with_name("one.csv"), tmp_path / "empty.toml"
     empty.write_text("")
     capsys.readouterr()
     for words, said in (
