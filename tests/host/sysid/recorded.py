@@ -1,12 +1,15 @@
 """Recorded flights that several tests look at: each is flown and reconstructed once a run."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 from host.aircraft.mass_properties import airframe_data
 from host.instrument.deviations import sensor_error_model
 from host.readers.even_grid import even_columns
+from host.sysid.coefficients import Window
 from host.sysid.reconstruction import Compatibility, reconstruct
+from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight
 
 from tests.host.logs import ROOT
@@ -29,3 +32,22 @@ def flown(card: str, seed: int) -> tuple[VirtualFlight, Columns]:
 def reconstructed(card: str, seed: int) -> Compatibility:
     """Return what its sensors are wrong by, as it is found."""
     return reconstruct(flown(card, seed)[1], airframe_data(NAME), sensor_error_model(NAME))
+
+
+@lru_cache(maxsize=1)
+def nominal_multisine() -> VirtualFlight:
+    """Return a flight with dynamics, friction and noise of the sensors, gusts, nothing drawn."""
+    card = load("multisine")
+    nominal = replace(card, sensors=replace(card.sensors, tolerances=False))
+    return virtual_flight(nominal, 7, chain="none")
+
+
+def aloft(flight: VirtualFlight) -> tuple[Columns, list[Window]]:
+    """Return the even columns of a flight behind its launch, and the windows of its maneuvers."""
+    columns, _ = even_columns(flight.table)
+    flying = columns["t_s"] > 8.0
+    windows = [
+        Window(float(str(m["start_s"])) - 0.5, float(str(m["end_s"])), m["axes"] == ["elevator"])
+        for m in flight.maneuvers
+    ]
+    return {k: v[flying] for k, v in columns.items()}, windows

@@ -1,24 +1,16 @@
 """From a virtual flight to the answer: finding, grading, correcting, converting, saying so."""
 
-import json
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
-from host.aircraft.mass_properties import AirframeData, Condition
+from host.aircraft.mass_properties import AirframeData
 from host.cli import main
-from host.errors import IdentificationError
-from host.sysid import Maneuver, fit
-from host.sysid.aerodynamics import coefficient_parts, coefficients
 from host.sysid.flight import read_columns
 from host.sysid.maneuvers import detect_maneuvers, grade
-from host.sysid.models import Trim, read_model
-from host.sysid.models.templates import longitudinal
-from host.sysid.numerics import OutputProblem
 from host.sysid.reconstruction.position_correction import transfer_to_cg
 
 
@@ -104,97 +96,10 @@ def test_vane_and_accelerometer_are_moved_to_the_cg() -> None:
     np.testing.assert_allclose(back["beta_rad"], 0.05, atol=1e-9)
 
 
-def test_coefficients_invert_the_textbook_derivatives() -> None:
-    """Etkin's dimensional derivatives from known coefficients, and back."""
-    airframe = AirframeData("a", 2.0, 0.04, 0.08, 0.12, 0.0, 0.3, 1.2, 0.25, inertia_share=0.05)
-    V, qbar = 16.0, 0.5 * 1.2 * 16.0**2
-    model = longitudinal(Trim(V))
-    wanted = {"CL_alpha": 4.0, "Cm_alpha": -1.5, "Cm_q": -10.0, "Cm_de": -1.2, "CL_de": 0.5}
-    moment = qbar * 0.3 * 0.25 / 0.08
-    values = {
-        "Z_alpha": -qbar * 0.3 * 4.0 / (2.0 * V),
-        "Z_de": -qbar * 0.3 * 0.5 / (2.0 * V),
-        "M_alpha": moment * -1.5,
-        "M_q": moment * -10.0 * 0.25 / (2.0 * V),
-        "M_de": moment * -1.2,
-    }
-    theta = np.array([values.get(p.name, -0.1) for p in model.parameters])
-    u = np.zeros((300, 1))
-    u[50:80], u[80:110] = 0.05, -0.05
-    problem = OutputProblem(model, [Maneuver(0.02, u, np.zeros((300, 6)))])
-    response = problem.respond(np.concatenate([theta, np.zeros(10)]))
-    assert response is not None
-    y = response[0].y.T
-    noise = 1e-4 * y.std(axis=0) * np.random.default_rng(1).standard_normal(y.shape)
-    result = fit("output-error", model.with_start(theta), [Maneuver(0.02, u, y + noise)])
-    found = {
-        c.name: c for c in coefficients(coefficient_parts(result, airframe, Condition(V, qbar)))
-    }
-    for name, value in wanted.items():
-        assert found[name].value == pytest.approx(value, rel=0.01), name
-    assert found["Cm_alpha"].half_width == pytest.approx(
-        1.96 * np.hypot(0.05, 0.02) * 1.5, rel=0.05
-    )
-
-
-def test_lever_is_found_and_leaves_the_derivatives_alone() -> None:
-    model = longitudinal(Trim(17.0), imu_sd_m=0.02)
-    names = [p.name for p in model.parameters]
-    theta = model.start.copy()
-    theta[names.index("imu_x_m")] = 0.03
-    u = np.zeros((400, 1))
-    u[30:60], u[60:80], u[80:90], u[90:100] = 0.05, -0.05, 0.05, -0.05
-    problem = OutputProblem(model, [Maneuver(0.01, u, np.zeros((400, 6)))])
-    response = problem.respond(np.concatenate([theta, np.zeros(10)]))
-    assert response is not None
-    y = response[0].y.T
-    noise = 1e-3 * y.std(axis=0) * np.random.default_rng(2).standard_normal(y.shape)
-    result = fit("output-error", model, [Maneuver(0.01, u, y + noise)])
-    assert result.value("imu_x_m") == pytest.approx(0.03, abs=0.002)
-    assert result.value("Z_de") == pytest.approx(-0.5, rel=0.05)
-
-
-def test_foreign_tables_come_in_through_a_map(tmp_path: Path) -> None:
-    t = np.arange(0.0, 2.0, 0.01)
-    frame = pd.DataFrame({"TimeUS": t * 1e6, "AOA": np.degrees(0.1 + 0 * t), "Nz": 1.0 + 0 * t})
-    frame.to_csv(tmp_path / "x.csv", index=False)
-    (tmp_path / "map.toml").write_text(
-        '[columns]\nt_s = { from = "TimeUS", unit = "us" }\n'
-        'alpha_rad = { from = "AOA", unit = "deg" }\n'
-        'az_mps2 = { from = "Nz", unit = "g", sign = -1 }\n'
-    )
-    columns, _ = read_columns(tmp_path / "x.csv", tmp_path / "map.toml")
-    np.testing.assert_allclose(columns["alpha_rad"], 0.1)
-    np.testing.assert_allclose(columns["az_mps2"], -9.80665)
-    with pytest.raises(IdentificationError, match="no column t_s"):
-        read_columns(tmp_path / "x.csv")
-    (tmp_path / "bad.toml").write_text('[columns]\nt_s = { from = "TimeUS", unit = "week" }\n')
-    with pytest.raises(IdentificationError, match="unit 'week' unknown"):
-        read_columns(tmp_path / "x.csv", tmp_path / "bad.toml")
-
-
-def test_verbs_answer_and_fail_in_one_line(
-    flown: tuple[Path, dict[str, Any]],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+def test_verbs_fail_in_one_line(
+    flown: tuple[Path, dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source = str(flown[0])
-    assert main(["maneuvers", source, "--json"]) == 0
-    assert len(json.loads(capsys.readouterr().out)["maneuvers"]) == 10
-    saved, mat = tmp_path / "model.toml", tmp_path / "model.mat"
-    quick = ["--method", "output-error-white"]
-    options = ["--model", "short-period", "--save-model", str(saved), "--mat", str(mat), "--json"]
-    assert main(["identify", source, *options, *quick]) == 0
-    answer = json.loads(capsys.readouterr().out)["answers"][0]
-    assert answer["parameters"]["M_alpha"]["value"] == pytest.approx(-280.0, rel=0.25)
-    assert read_model(saved).name == "short-period"
-    assert mat.exists()
-    assert main(["identify", source, "--model", "roll", *quick]) == 0
-    assert "Known from this flight: roll " in capsys.readouterr().out
-    truth = str(flown[0].with_name("flight.truth.toml"))
-    known = ["--aircraft", "ultrastick25e", "--truth", truth, "--model", "short-period", *quick]
-    assert main(["identify", source, *known]) == 0
-    assert "intervals hold the truth" in capsys.readouterr().out
     for wrong in (
         ["identify", source, "--truth", source],
         ["identify", str(tmp_path / "nothing.bin")],

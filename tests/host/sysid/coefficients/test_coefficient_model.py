@@ -15,11 +15,9 @@ from host.cli import main
 from host.errors import IdentificationError
 from host.export import toml as tomlout
 from host.instrument.deviations import sensor_error_model
-from host.readers.even_grid import even_columns
 from host.sysid.coefficients import (
     CoefficientFit,
     CoefficientModel,
-    Window,
     fit_coefficients,
     standard_model,
 )
@@ -30,7 +28,8 @@ from host.sysid.models.coefficient_model import parse_term
 from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight
 
-NAME = "ultrastick25e"
+from tests.host.sysid.recorded import NAME, aloft
+
 BEND, LIFTED_DAMPING = -4.0, -40.0  # of the bent aircraft: Cm_alpha2, Cm_alpha_q
 ROWS = {
     "CL": ["alpha", "q", "de"],
@@ -83,15 +82,8 @@ def bent(tmp_path_factory: pytest.TempPathFactory) -> VirtualFlight:
 
 
 def fitted(flight: VirtualFlight, model: CoefficientModel | None) -> CoefficientFit:
-    columns, _ = even_columns(flight.table)
-    flying = columns["t_s"] > 8.0
-    windows = [
-        Window(float(str(m["start_s"])) - 0.5, float(str(m["end_s"])), m["axes"] == ["elevator"])
-        for m in flight.maneuvers
-    ]
-    kept = {k: v[flying] for k, v in columns.items()}
     data = sensor_error_model(NAME)
-    return fit_coefficients(kept, windows, airframe_data(NAME), data, powerplant(NAME), model)
+    return fit_coefficients(*aloft(flight), airframe_data(NAME), data, powerplant(NAME), model)
 
 
 def by_name(fit: CoefficientFit) -> dict[str, Derivative]:

@@ -11,7 +11,6 @@ from host.arrays import Array
 from host.constants import NORMAL_95
 from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel, deviations, sensor_error_model
-from host.readers.even_grid import even_columns
 from host.sysid.coefficients import CoefficientFit, Window, window_transform
 from host.sysid.coefficients.coefficient_search import fit_coefficients, search_coefficients
 from host.sysid.maneuvers import DetectedManeuver
@@ -20,13 +19,12 @@ from host.sysid.reconstruction.inverse_sensor_model import (
     apply_sensor_errors,
     usable_length,
 )
-from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight
 from studies.flights import PRINCIPAL, Tally
 
 from tests.host.sysid.at_hand import identify_coefficients
+from tests.host.sysid.recorded import NAME, aloft, nominal_multisine
 
-NAME = "ultrastick25e"
 # What an instrument without drawn errors leaves; arms and tilts of the real one are not in it.
 WITHIN = {
     "CL_alpha": 0.03, "CL_de": 0.12, "Cm_alpha": 0.04, "Cm_q": 0.03, "Cm_de": 0.04,
@@ -38,9 +36,7 @@ WITHIN = {
 @pytest.fixture(scope="module")
 def flight() -> VirtualFlight:
     """Sensors with their dynamics, friction, noise and gusts; nothing drawn."""
-    card = load("multisine")
-    nominal = replace(card, sensors=replace(card.sensors, tolerances=False))
-    return virtual_flight(nominal, 7, chain="none")
+    return nominal_multisine()
 
 
 def fitted(
@@ -49,7 +45,7 @@ def fitted(
     airframe: AirframeData | None = None,
     gains: Mapping[str, float] | None = None,
 ) -> CoefficientFit:
-    columns, windows = flown(flight)
+    columns, windows = aloft(flight)
     kept = {k: v * (gains or {}).get(k, 1.0) for k, v in columns.items()}
     frame = airframe or airframe_data(NAME)
     return fit_coefficients(kept, windows, frame, data, powerplant(NAME))
@@ -59,16 +55,6 @@ def fitted(
 def still(flight: VirtualFlight) -> CoefficientFit:
     """Return the fit of that flight as it is."""
     return fitted(flight, sensor_error_model(NAME))
-
-
-def flown(flight: VirtualFlight) -> tuple[dict[str, Array], list[Window]]:
-    columns, _ = even_columns(flight.table)
-    flying = columns["t_s"] > 8.0
-    windows = [
-        Window(float(str(m["start_s"])) - 0.5, float(str(m["end_s"])), m["axes"] == ["elevator"])
-        for m in flight.maneuvers
-    ]
-    return {k: v[flying] for k, v in columns.items()}, windows
 
 
 def misses(flight: VirtualFlight, fit: CoefficientFit) -> dict[str, float]:
@@ -99,7 +85,7 @@ def test_finds_the_truth_and_covers_it(flight: VirtualFlight, still: Coefficient
 
 def test_known_residuals_know_the_air_too(flight: VirtualFlight) -> None:
     """Noise in the roll rate moves Cl_p as rolling air does: where the air is known, by no air."""
-    columns, windows = flown(flight)
+    columns, windows = aloft(flight)
     noise = np.random.default_rng(3).normal(0.0, 1.0, len(columns["t_s"]))
     noisy = {**columns, "p_radps": columns["p_radps"] + noise}
     given = noisy, windows, airframe_data(NAME), sensor_error_model(NAME), powerplant(NAME)

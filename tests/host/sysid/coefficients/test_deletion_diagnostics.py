@@ -8,7 +8,6 @@ from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
-from host.readers.even_grid import even_columns
 from host.sysid.coefficients import CoefficientFit, fit_coefficients
 from host.sysid.coefficients.deletion_diagnostics import (
     FinalStep,
@@ -30,10 +29,9 @@ from host.sysid.coefficients.window_spectra import (
 )
 from host.sysid.numerics.maneuver_agreement import scatter_test
 from host.sysid.reconstruction import Spectrum
-from host.twin.testcard.cards import load
-from host.twin.virtual import virtual_flight
 
-NAME = "ultrastick25e"
+from tests.host.sysid.recorded import NAME, aloft, nominal_multisine
+
 TERMS = ("alpha", "q")
 TRUE = np.array([-1.6, 3.0])
 NOISE = {"Cm": (np.array([0.1, 4.5]), np.array([0.5, 2.0]))}
@@ -141,21 +139,13 @@ def test_maneuvers_of_one_aircraft_agree_as_often_as_chance_says() -> None:
 
 def slipped(share: float) -> CoefficientFit:
     """A flight of orthogonal multisines; in its last third the elevator's pot reads too much."""
-    card = load("multisine")
-    flight = virtual_flight(
-        replace(card, sensors=replace(card.sensors, tolerances=False)), 7, chain="none"
-    )
-    columns, _ = even_columns(flight.table)
-    windows = [
-        Window(float(str(m["start_s"])) - 0.5, float(str(m["end_s"])), m["axes"] == ["elevator"])
-        for m in flight.maneuvers
-    ]
+    columns, windows = aloft(nominal_multisine())
     last = [w for w in windows if w.longitudinal][-1]
     t, moved = columns["t_s"], columns["elevator_rad"].copy()
     inside = (t >= last.first_s) & (t <= last.last_s)
     mean = float(moved[inside].mean())
     moved[inside] = mean + (1.0 + share) * (moved[inside] - mean)
-    kept = {k: v[t > 8.0] for k, v in (columns | {"elevator_rad": moved}).items()}
+    kept = columns | {"elevator_rad": moved}
     return fit_coefficients(
         kept, windows, airframe_data(NAME), sensor_error_model(NAME), powerplant(NAME)
     )

@@ -1,7 +1,6 @@
 """Coefficients of flights that lack an axis, a surface, thrust or air: what is left is right."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,12 +14,10 @@ from host.physical.recording import SURFACES
 from host.readers.even_grid import even_columns
 from host.sysid.coefficients import CoefficientModel
 from host.sysid.models import read_model
-from host.twin.testcard.cards import load
-from host.twin.virtual import virtual_flight
 
 import host
+from tests.host.sysid.recorded import NAME, nominal_multisine
 
-NAME = "ultrastick25e"
 SIDE = (
     "beta_rad", "p_radps", "r_radps", "ay_mps2", "phi_rad", "aileron_rad", "rudder_rad",
 )  # fmt: skip
@@ -31,9 +28,7 @@ ROLL_AND_YAW = ("Cl_beta", "Cl_p", "Cl_da", "Cn_beta", "Cn_r", "Cn_dr")
 @pytest.fixture(scope="module")
 def table() -> pd.DataFrame:
     """A multisine on each axis, nothing drawn, by our logger, whose clock GPS checked."""
-    card = load("multisine")
-    nominal = replace(card, sensors=replace(card.sensors, tolerances=False))
-    columns, _ = even_columns(virtual_flight(nominal, 7, chain="none").table)
+    columns, _ = even_columns(nominal_multisine().table)
     found = pd.DataFrame(columns)
     found.attrs = {"inputs": dict.fromkeys(SURFACES, "measured"), "clock_half_width": 0.0}
     return found

@@ -124,24 +124,6 @@ def test_a_joint_estimate_is_that_of_one_least_squares(
     np.testing.assert_allclose(white, bound, rtol=0.02)
 
 
-def test_a_joint_estimate_weighs_each_record_by_its_information(
-    two: tuple[Drawn, Drawn], model: LinearModel
-) -> None:
-    """Constants eliminated, the records' own estimates add up to the joint one."""
-    joint = fit("output-error-white", model, [one.maneuver() for one in two])
-    information, right = np.zeros((5, 5)), np.zeros(5)
-    for one in two:
-        alone = fit("output-error-white", model, [one.maneuver()])
-        own = np.linalg.inv(alone.covariance_white[:5, :5])
-        information += own
-        right += own @ alone.estimate[:5]
-    bound = np.sqrt(np.diag(joint.covariance_white))[:5]
-    weighted = np.linalg.solve(information, right)
-    assert np.max(np.abs(joint.estimate[:5] - weighted) / bound) < 0.3
-    constants = [name for name in joint.names if name.endswith(("@1", "@2"))]
-    assert len(constants) == 8
-
-
 @pytest.mark.parametrize("method", methods())
 def test_records_of_two_rates_are_fitted_by_every_method_or_refused_in_a_line(
     method: str, two: tuple[Drawn, Drawn], model: LinearModel
