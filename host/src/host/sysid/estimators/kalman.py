@@ -117,7 +117,7 @@ def innovation_inflation(white: Sequence[Array]) -> float:
         moments /= sum(len(x) for x in parts)
         negligible = np.flatnonzero(moments < NEGLIGIBLE_CORRELATION * moments[0])
         end = int(negligible[0]) if len(negligible) else lags
-        total += max(float(2.0 * np.sum(moments[:end]) - moments[0]), 0.0)
+        total += max(2.0 * float(np.sum(moments[:end])) - float(moments[0]), 0.0)
     return float(max(total / white[0].shape[1], 1.0))
 
 

@@ -145,8 +145,9 @@ def _moved(
     """Return a quantity moved by hand in an item's window: (seconds, value), straight between."""
     rows = walk.rows(item)
     count = walk.windows[-1][2]
-    at = [rows.start * STEP_S + begin_s + seconds for seconds, _ in moves]
-    return np.asarray(np.interp(np.arange(count) * STEP_S, at, [value for _, value in moves]))
+    seconds, values = np.array(moves).T
+    at_s = rows.start * STEP_S + begin_s + seconds
+    return np.asarray(np.interp(np.arange(count) * STEP_S, at_s, values))
 
 
 def _lifted(walk: GroundWalk, name: str) -> Array:
