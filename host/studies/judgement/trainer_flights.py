@@ -71,7 +71,7 @@ def perfect_sensors(seed: int) -> Flown:
     return Flown(truth, identify)
 
 
-def with_file(seed: int) -> Flown:
+def with_file(seed: int, models: str | None = None) -> Flown:
     """Return a flight of which a file and a calibration tell the errors that are drawn."""
     measured, true = _flown(seed)
     rng = np.random.default_rng([DRAW, seed])
@@ -86,6 +86,7 @@ def with_file(seed: int) -> Flown:
                 pd.DataFrame(table),
                 aircraft=drawn_file(Path(folder), rng),
                 calibration=SENSORS_FILE,
+                models=models,
                 truth=path,
             )
 

@@ -25,7 +25,9 @@ from host.sysid.reconstruction.sensor_dynamics import DELAYED_COLUMNS, PLACES, P
 
 NAME = "ultrastick25e"
 AIRSPEED_MPS = 20.0
-BY_DRAWING = {"elevator_arm_share", "rudder_arm_share", "sidewash_share"}
+BY_DRAWING = {
+    "elevator_arm_share", "rudder_arm_share", "sidewash_share", "pitching_drag_share",
+}  # fmt: skip
 
 
 def instrument(*, commanded: bool) -> SensorErrorModel:

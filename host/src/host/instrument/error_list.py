@@ -156,4 +156,5 @@ _ROWS: tuple[tuple[str, str, str, str, str, str, str], ...] = (
     ("elevator_arm_share", "arm of the elevator's force", "", FIXED, GEOMETRY, NOT_PAID, ESTIMATED),
     ("rudder_arm_share", "arm of the rudder's force", "", FIXED, GEOMETRY, NOT_PAID, ESTIMATED),
     ("sidewash_share", "sidewash of the ailerons", "", FIXED, GEOMETRY, NOT_PAID, ESTIMATED),
+    ("pitching_drag_share", "drag of pitching", "", FIXED, GEOMETRY, NOT_PAID, ESTIMATED),
 )  # fmt: skip

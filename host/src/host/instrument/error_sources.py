@@ -18,8 +18,10 @@ from host.instrument.instrument_errors import InstrumentErrors
 AIRCRAFT_FILE, INSTRUMENT, FLIGHT = "aircraft file", "instrument", "flight"
 TYPE = "type"
 ASSUMED = "assumed of this flight"  # because its columns lack what would tell
-# Arms of control forces and the sidewash of ailerons are the same in every aircraft of a type.
-_OF_TYPE = ("elevator_arm_share", "rudder_arm_share", "sidewash_share")
+# Relations of a drawing are the same in every aircraft of a type.
+_OF_TYPE = (
+    "elevator_arm_share", "rudder_arm_share", "sidewash_share", "pitching_drag_share",
+)  # fmt: skip
 # Error of the list -> error of `standard.toml` that it follows from, and its sensors there; of
 # several the first one named. Names that are alike in both are left out.
 _MADE_OF: dict[str, tuple[str, tuple[str, ...]]] = {

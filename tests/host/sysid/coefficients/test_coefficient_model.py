@@ -39,7 +39,7 @@ ROWS = {
     "Cl": ["beta", "p", "r", "da", "dr"],
     "Cn": ["beta", "p", "r", "da", "dr"],
 }
-BESIDE = {"CD": ["alpha^2", "alpha*de", "de^2"]}
+BESIDE = {"CD": ["q", "CL^2"]}
 
 
 def written(
@@ -163,7 +163,7 @@ def test_turning_is_the_slope_of_turned_forces(tmp_path: Path) -> None:
 
 def test_the_standard_equations_are_a_file(tmp_path: Path) -> None:
     assert read_terms(written(tmp_path, ROWS)).equations == standard_model().equations
-    assert standard_model().nuisance == {"CD_alpha2", "CD_alpha_de", "CD_de2"}
+    assert standard_model().nuisance == {"CD_q", "CD_CL2"}
 
 
 def test_a_term_is_known_by_its_factors() -> None:
@@ -186,7 +186,7 @@ def test_a_term_is_known_by_its_factors() -> None:
         ({"Cm": ["alpha", "|alpha"]}, "unknown term '|alpha'"),
         ({"Cm": ["alpha", "CL^2"]}, "lift stands in CD only, as CL^2"),
         ({"Cm": ["alpha", "q*alpha", "alpha*q_hat"]}, "Cm: alpha_q stands there twice"),
-        ({"CD": ["alpha", "de^2"]}, "CD: de2 stands there twice"),  # in [beside] too
+        ({"CD": ["alpha", "CL^2"]}, "CD: CL2 stands there twice"),  # in [beside] too
         ({row: [] for row in ROWS}, "[rows] needs one row or more"),
         ({"CX": ["alpha"]}, "unknown row CL"),
         ({"CW": ["alpha"]}, "unknown row CW"),

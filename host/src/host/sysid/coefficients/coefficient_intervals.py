@@ -107,7 +107,12 @@ class SearchResult:
 
 
 def derivatives_of(
-    problem: FlightProblem, data: EquationData, state: Array, level_slopes: Array | None = None
+    problem: FlightProblem,
+    data: EquationData,
+    state: Array,
+    level_slopes: Array | None = None,
+    *,
+    nuisance: bool = False,
 ) -> DerivativesAtTrim:
     """Return the derivatives at the mean condition of a flight, with their slopes.
 
@@ -119,13 +124,15 @@ def derivatives_of(
         All unknowns, sensor errors last.
     level_slopes : Array, shape (3, errors), optional
         Of `mean_levels`; without them CL and CD count as exact.
+    nuisance : bool
+        Of nuisance terms too.
     """
     _, drag, lift = mean_levels(problem, data)
     slopes = np.zeros((3, len(state)))
     if level_slopes is not None:
         slopes[:, -level_slopes.shape[1] :] = level_slopes
     means = TrimMeans(problem.condition[2], lift, drag, slopes[2], slopes[1])
-    return derivatives_at_trim(problem.model, state, problem.position, means)
+    return derivatives_at_trim(problem.model, state, problem.position, means, nuisance=nuisance)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +169,7 @@ def intervals(search: SearchResult) -> CoefficientIntervals:
     state, covariance, gain_complement, arm_shifts = apply_geometry_prior(
         state,
         search.covariance,
-        derivatives_of(problem, data, state),
+        derivatives_of(problem, data, state, nuisance=True),
         problem.airframe,
     )
     found = derivatives_of(problem, data, state, level_slopes)

@@ -4,7 +4,9 @@ The arm between accelerometers and CG shows in the data only together with lift:
 a larger CL_de are the same flight. Where a control surface's force acts separates the two: it acts
 between a quarter of the tail's chord and the hinge line, so moment over force is an arm that a tape
 measure knows. Ailerons on a straight wing make side force only by their sidewash on the fin, which
-says as much about the arm along z.
+says as much about the arm along z. Lift of pitching drags by anything from nothing, where a tail
+makes it, to all that the polar has for it, evenly: the elevator's drag shows in the data only
+together with it, and with the tilt of the accelerometers.
 
 Each of these is a measurement with its uncertainty (mixed estimation with prior information; Klein
 & Morelli, Aircraft System Identification, ch. 5), applied by a Kalman update.
@@ -16,10 +18,12 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
+from host.constants import EVEN_SD
 from host.sysid.coefficients.trim_derivatives import DerivativesAtTrim
 
 # Errors of the relations.
 ELEVATOR_ARM, RUDDER_ARM, SIDEWASH = "elevator_arm_share", "rudder_arm_share", "sidewash_share"
+PITCHING_DRAG = "pitching_drag_share"
 SIDEWASH_SHARE = 0.1  # standard deviation of CY_da over CY_beta
 
 
@@ -34,7 +38,8 @@ def apply_geometry_prior(
         Estimate of the fit: coefficients, slow gusts, sensor errors.
     covariance : Array, shape (n, n)
     at_trim : dict
-        From `derivatives_at_trim`. A relation whose derivatives are absent is left out.
+        From `derivatives_at_trim`, nuisance terms too. A relation whose derivatives are absent is
+        left out.
     airframe : AirframeData
         An arm of 0 is not known and adds nothing.
 
@@ -62,14 +67,18 @@ def apply_geometry_prior(
     if {"CY_da", "CY_beta"} <= at_trim.keys():
         sd = SIDEWASH_SHARE * abs(at_trim["CY_beta"][0])
         relations.append((SIDEWASH, {"CY_da": 1.0}, sd))
+    if {"CD_q", "CD_alpha", "CL_alpha", "CL_q"} <= at_trim.keys():
+        half = 0.5 * at_trim["CD_alpha"][0] / at_trim["CL_alpha"][0]
+        sd = EVEN_SD * abs(half * at_trim["CL_q"][0])
+        relations.append((PITCHING_DRAG, {"CD_q": 1.0, "CL_q": -half}, sd))
     shifts: dict[str, Array] = {}
+    start = state
     for error, weights, sd in relations:
         # One row h of H: the relation sum(weight * derivative) = 0 is measured with variance sd^2.
-        h = np.zeros(len(state))
-        for name, weight in weights.items():
-            h += weight * at_trim[name][1]
+        h = sum((w * at_trim[name][1] for name, w in weights.items()), np.zeros(len(state)))
+        value = sum(w * at_trim[name][0] for name, w in weights.items()) + h @ (state - start)
         gain = covariance @ h / (h @ covariance @ h + sd**2)
-        state = state - gain * (h @ state)
+        state = state - gain * value
         complement = np.eye(len(state)) - np.outer(gain, h)
         # Joseph's form: symmetric and positive for any gain.
         covariance = complement @ covariance @ complement.T + np.outer(gain, gain) * sd**2

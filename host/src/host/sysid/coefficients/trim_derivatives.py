@@ -43,7 +43,12 @@ DerivativesAtTrim = dict[str, tuple[float, Array]]
 
 
 def derivatives_at_trim(
-    model: CoefficientModel, state: Array, position: Mapping[str, int], means: TrimMeans
+    model: CoefficientModel,
+    state: Array,
+    position: Mapping[str, int],
+    means: TrimMeans,
+    *,
+    nuisance: bool = False,
 ) -> DerivativesAtTrim:
     """Return every derivative that an answer reports.
 
@@ -54,20 +59,22 @@ def derivatives_at_trim(
         All unknowns; the coefficients of the terms at `position`.
     position : mapping
     means : TrimMeans
+    nuisance : bool
+        Of nuisance terms too.
 
     Returns
     -------
     dict
-        Fitted terms in the order of the model without the nuisance terms, then what follows from
-        them.
+        Fitted terms in the order of the model, then what follows from them.
     """
     unit = np.eye(len(state))
     terms: DerivativesAtTrim = {name: (float(state[k]), unit[k]) for name, k in position.items()}
-    found = {name: terms[name] for name, _, _ in model.named() if name not in model.nuisance}
+    left_out = () if nuisance else model.nuisance
+    found = {name: terms[name] for name, _, _ in model.named() if name not in left_out}
     if set(BODY) <= model.equations.keys():
         found |= _from_body_axes(terms, means)
     if POLAR in terms:
-        found |= _with_drag_polar(terms, means)
+        found |= {n: d for n, d in _with_drag_polar(terms, means).items() if n not in left_out}
     return found
 
 
@@ -141,7 +148,8 @@ def _with_drag_polar(terms: DerivativesAtTrim, means: TrimMeans) -> DerivativesA
     k, dk = terms[POLAR]
     absent = (0.0, np.zeros_like(means.lift_slope))
     result: DerivativesAtTrim = {}
-    for label in ("alpha", "de"):
+    labels = ("alpha", "q", "de") if "CD_q" in terms else ("alpha", "de")
+    for label in labels:
         own, own_slope = terms.get(f"CD_{label}", absent)
         lift, lift_slope = terms.get(f"CL_{label}", absent)
         slope = means.lift * (lift * dk + k * lift_slope) + k * lift * means.lift_slope
