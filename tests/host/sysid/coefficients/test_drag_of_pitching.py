@@ -1,16 +1,15 @@
 """The elevator's drag holds its truth, whether or not the lift of pitching drags."""
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping
 
 import pytest
 from host.readers.even_grid import even_columns
 from host.sysid.pipeline import Identification, at_hand, identify_columns
-from host.twin.testcard.cards import load
-from host.twin.virtual import virtual_flight
 from studies.judgement import trainer_flights
 
-NAME, DIRECT = "ultrastick25e", "coefficients"
+from tests.host.sysid.recorded import NAME, nominal_multisine
+
+DIRECT = "coefficients"
 CALM = 207  # no gusts: what is off is no accident of them
 
 
@@ -22,14 +21,11 @@ def lift_of_pitching_drags() -> tuple[Identification, float]:
 
 def lift_of_pitching_does_not() -> tuple[Identification, float]:
     """The twin, whose polar has alpha and elevator alone; elevator maneuvers tell no tilt."""
-    card = load("multisine")
-    nominal = replace(card, sensors=replace(card.sensors, tolerances=False))
-    flight = virtual_flight(nominal, 8, chain="none")
+    flight = nominal_multisine()
     table, _ = even_columns(flight.table)
-    [along] = [m for m in flight.maneuvers if m["axes"] == ["elevator"]][:1]
-    return identify_columns(at_hand(table, aircraft=NAME), models=DIRECT), along["derivatives"][
-        "CD_de"
-    ]
+    [local, *_] = [m["derivatives"] for m in flight.maneuvers if m["axes"] == ["elevator"]]
+    assert isinstance(local, Mapping)
+    return identify_columns(at_hand(table, aircraft=NAME), models=DIRECT), local["CD_de"]
 
 
 @pytest.mark.parametrize("fly", [lift_of_pitching_drags, lift_of_pitching_does_not])
