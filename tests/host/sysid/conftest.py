@@ -57,3 +57,9 @@ def sensors_without_errors() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("host.instrument.deviations.errors_without_file", known_sensors)
         yield
+
+
+@pytest.fixture
+def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run a user's equations as where numba is missing: that takes no compiler's time."""
+    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)

@@ -85,12 +85,9 @@ LATER = {
 
 
 @pytest.fixture(scope="module")
-def record(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+def record(simulated: Callable[[str, int], Path]) -> pd.DataFrame:
     """A calm flight as another logger's table."""
-    folder = tmp_path_factory.mktemp("calm")
-    options = ["--seed", "19480", "--firmware", "none", "--no-picture", "-o", str(folder)]
-    assert main(["simulate", "calm", *options]) == 0
-    table = pd.read_csv(folder / "flight.csv")
+    table = pd.read_csv(simulated("calm", 19480) / "flight.csv")
     theirs = [name for name in ("t_s", *USED) if name in table]
     return table.loc[table["t_s"] > 8.0, theirs].iloc[::2].reset_index(drop=True)
 

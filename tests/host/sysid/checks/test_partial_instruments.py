@@ -18,6 +18,7 @@ from scipy.signal import lsim
 from studies.foreign.flight import Air, derivatives, fly
 
 import host
+from tests.host.sysid.held import assert_held
 
 DT_S = 0.02
 TRIM_ALPHA_RAD, SPEED_MPS = 0.06, 17.0
@@ -260,10 +261,8 @@ def test_without_accelerations_a_gust_is_no_delay_of_the_vane() -> None:
     measured, _ = fly(Air(intensity_mps=0.3, spread=True), 17025)
     table = pd.DataFrame({k: measured[k] for k in columns})
     [answer] = host.identify(table, models="short-period").linear
-    true, half = derivatives(answer.trim.airspeed_mps), answer.result.half_width()
-    for name in ("Z_alpha", "M_alpha", "M_q"):
-        k = answer.result.index(name)
-        assert abs(answer.result.estimate[k] - true[name]) < half[k], name
+    true = derivatives(answer.trim.airspeed_mps)
+    assert_held(answer.result, true, ("Z_alpha", "M_alpha", "M_q"))
 
 
 LONGITUDINAL = ("t_s", "airspeed_mps", "q_radps", "theta_rad", "az_mps2", "elevator_rad")
@@ -300,11 +299,7 @@ def test_columns_of_one_axis_are_enough(
     trainer: pd.DataFrame, columns: tuple[str, ...], model: str, known: dict[str, float]
 ) -> None:
     [answer] = host.identify(flown_on(trainer, model)[list(columns)], models=model).linear
-    true, half = derivatives(answer.trim.airspeed_mps), answer.result.half_width()
-    for name, share in known.items():
-        width = half[answer.result.index(name)]
-        assert abs(answer.result.value(name) - true[name]) < width, name
-        assert width < share * abs(true[name]), name
+    assert_held(answer.result, derivatives(answer.trim.airspeed_mps), known=known)
 
 
 def test_lateral_motion_needs_no_accelerometers() -> None:
@@ -313,11 +308,8 @@ def test_lateral_motion_needs_no_accelerometers() -> None:
     forces = ["ax_mps2", "ay_mps2", "az_mps2"]
     table = flown_on(pd.DataFrame(measured), "lateral").drop(columns=forces)
     [answer] = host.identify(table, models="lateral").linear
-    true, half = derivatives(answer.trim.airspeed_mps), answer.result.half_width()
-    for name in ("L_beta", "L_p", "L_da", "N_beta", "N_dr"):
-        width = half[answer.result.index(name)]
-        assert abs(answer.result.value(name) - true[name]) < width, name
-        assert width < 0.1 * abs(true[name]), name
+    known = dict.fromkeys(("L_beta", "L_p", "L_da", "N_beta", "N_dr"), 0.1)
+    assert_held(answer.result, derivatives(answer.trim.airspeed_mps), known=known)
 
 
 def test_a_side_force_of_doubtful_unit_is_in_no_linear_fit(trainer: pd.DataFrame) -> None:
@@ -327,9 +319,8 @@ def test_a_side_force_of_doubtful_unit_is_in_no_linear_fit(trainer: pd.DataFrame
     [answer] = host.identify(table, models="lateral").linear
     assert "ay_mps2" not in answer.result.model.outputs
     assert any("ay_mps2 has an open finding" in w for w in answer.result.warnings)
-    true, half = derivatives(answer.trim.airspeed_mps), answer.result.half_width()
-    for name in ("L_p", "L_r", "L_da", "N_beta", "N_r", "N_dr"):
-        assert abs(answer.result.value(name) - true[name]) < half[answer.result.index(name)], name
+    names = ("L_p", "L_r", "L_da", "N_beta", "N_r", "N_dr")
+    assert_held(answer.result, derivatives(answer.trim.airspeed_mps), names)
     [kept] = host.identify(
         table, models="lateral", methods="equation-error", accept=("beta-against-ay",)
     ).linear

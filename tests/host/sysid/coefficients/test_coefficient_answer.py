@@ -2,18 +2,18 @@
 
 import json
 import tomllib
-from dataclasses import replace
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
+from host.aircraft.mass_properties import Condition, airframe_data
 from host.cli import main
 from host.export.pictures import save
 from host.sysid.answer import read_truth, true_coefficients
 from host.sysid.answer.figure_kinds import Bar, interval_bars
 from host.sysid.coefficients import CoefficientAnswer
 from host.sysid.coefficients.coefficient_estimator import merged_windows
-from host.sysid.coefficients.coefficient_modes import coefficient_modes, quantities
+from host.sysid.coefficients.coefficient_modes import quantities
 from host.sysid.conversion import ConversionPoint, to_derivatives
 from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.pipeline import Identification, identify
@@ -24,12 +24,9 @@ RED = "#d62728"
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(simulated: Callable[[str, int], Path]) -> Path:
     """A flight of the survey card, every tolerance drawn, without the recorder."""
-    folder = tmp_path_factory.mktemp("survey")
-    flags = ["--firmware", "none", "--no-picture", "--seed", "31", "-o", str(folder)]
-    assert main(["simulate", "survey", *flags]) == 0
-    return folder
+    return simulated("survey", 31)
 
 
 @pytest.fixture(scope="module")
@@ -86,66 +83,6 @@ def test_the_rotor_settles_within_a_phugoid(folder: Path, answer: CoefficientAns
     frequency, damping = (sum(x) / len(x) for x in zip(*expected, strict=True))
     assert found.frequency_radps == pytest.approx(frequency, rel=0.03)
     assert found.damping == pytest.approx(damping, rel=0.1)
-
-
-def test_another_inertia_than_the_fit_used_moves_the_modes(answer: CoefficientAnswer) -> None:
-    frame = airframe_data(NAME)
-    heavy = AirframeData(
-        **{f: getattr(frame, f) for f in frame.__dataclass_fields__ if f != "iyy_kgm2"},
-        iyy_kgm2=1.2 * frame.iyy_kgm2,
-    )
-    same, other = (
-        next(m for m in coefficient_modes(answer.fit, a) if m.name == "short period")
-        for a in (frame, heavy)
-    )
-    assert other.frequency_radps < 0.95 * same.frequency_radps
-
-
-def test_modes_need_no_zero_of_the_pitot(answer: CoefficientAnswer) -> None:
-    fit, drift_pa = answer.fit, 6.0
-    (was, sd), frame = fit.errors["pitot_zero_pa"], airframe_data(NAME)
-    more = (fit.condition.qbar_pa - was) / (fit.condition.qbar_pa - was - drift_pa)
-    assert more > 1.02
-    rates = tuple(f"_{k}" for k in "pqr")
-    scaled = tuple(
-        replace(d, value=d.value * (more**0.5 if d.name.endswith(rates) else more))
-        for d in fit.derivatives
-    )
-    errors = fit.errors | {"pitot_zero_pa": (was + drift_pa, sd)}
-    other = coefficient_modes(replace(fit, derivatives=scaled, errors=errors), frame)
-    for mode, same in zip(answer.modes, other, strict=True):
-        if mode.name in ("short period", "dutch roll"):
-            assert same.frequency_radps == pytest.approx(mode.frequency_radps, rel=0.003)
-
-
-def test_modes_are_at_the_airspeed_of_their_own_maneuvers(answer: CoefficientAnswer) -> None:
-    fit, frame = answer.fit, airframe_data(NAME)
-    along, across = fit.condition.airspeed_ratio
-    quick = replace(fit, condition=replace(fit.condition, airspeed_ratio=(1.02 * along, across)))
-    before, after = (
-        {m.name: m.frequency_radps for m in coefficient_modes(f, frame)} for f in (fit, quick)
-    )
-    assert after["short period"] == pytest.approx(1.02 * before["short period"], rel=0.002)
-    assert after["dutch roll"] == pytest.approx(before["dutch roll"], rel=1e-9)
-
-
-def test_the_linear_motion_is_that_of_the_true_aircraft(
-    folder: Path, answer: CoefficientAnswer
-) -> None:
-    truth = read_truth(folder / "flight.truth.toml")
-    flown, at = truth["flown"], truth["maneuver"][0]
-    pressure = at["condition"]["qbar_pa"] * 0.3093671232
-    for entry, name, arm, inertia, row in (
-        ((2, 1), "Cm_alpha", 0.2530602, flown["iyy_kgm2"], "longitudinal"),
-        ((1, 1), "Cl_p", 1.26365**2 / (2 * at["condition"]["airspeed_mps"]), flown["ixx_kgm2"],
-         "lateral"),
-    ):  # fmt: skip
-        expected = pressure * arm * true_coefficients(truth, row)[name] / inertia
-        system = answer.systems[row]
-        assert abs(system.A[entry] - expected) <= 1.5 * system.A_half[entry]
-        # The coefficient carries 5 % of inertia, the motion does not.
-        assert system.A_half[entry] < 0.055 * abs(expected)
-    assert answer.systems["lateral"].B.shape == (4, 2)
 
 
 def test_public_conversion_gives_the_same_motion(answer: CoefficientAnswer) -> None:

@@ -10,6 +10,8 @@ from host.sysid.errors.column_noise import column_noise
 from host.sysid.estimators import fit
 from host.sysid.models import Maneuver, Trim, equations_from
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 DT_S, SAMPLES, GYRO, ATTITUDE = 0.04, 100, 0.05, 0.002
 PITCH = equations_from(
     {
@@ -22,12 +24,6 @@ PITCH = equations_from(
     }
 )
 TRIM = Trim(17.0, 0.1, 0.1)
-
-
-@pytest.fixture(autouse=True)
-def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run the equations as Python: that takes no compiler's time."""
-    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
 
 
 def record(seed: int, gyro: float = GYRO) -> Maneuver:

@@ -12,6 +12,7 @@ from host.sysid.numerics import ArNoise, output_problem
 from scipy import signal
 
 import host
+from tests.host.sysid.held import assert_held
 
 LINEAR = """\
 name = "unstable"
@@ -51,13 +52,13 @@ TRUTH = {"Z_alpha": -1.5, "M_alpha": 7.0, "M_q": -2.5, "Z_de": -0.15, "M_de": -1
 DT_S, FINE = 0.02, 20
 
 
+@pytest.mark.usefixtures("interpreted")
 @pytest.mark.parametrize("text", [LINEAR, EQUATIONS], ids=["linear", "equations"])
 @pytest.mark.parametrize(("hold", "method"), [("zoh", "output-error-white"), ("foh", None)])
 def test_the_truth_of_a_record_without_noise_is_held(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, hold: str, method: str | None
+    tmp_path: Path, text: str, hold: str, method: str | None
 ) -> None:
     """By default a residual without noise had a memory, and intervals of 70 000 %."""
-    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
     t = np.arange(150 * FINE) * DT_S / FINE
     u = 0.03 * np.sin(4.0 * t) * np.sin(1.1 * t)
     flown, fitted = tmp_path / "flown.toml", tmp_path / "fitted.toml"
@@ -92,12 +93,8 @@ def test_a_template_holds_the_truth_where_the_input_was_held(speed: dict[str, fl
     [answer] = host.identify(
         table, models="short-period", from_s=0.0, to_s=3.0, delays=False
     ).linear
-    half = answer.result.half_width()
     truth = {"Z_alpha": -5.0, "M_alpha": -50.0, "M_q": -5.0, "Z_de": -0.15, "M_de": -14.0}
-    for name, value in truth.items():
-        k = answer.result.index(name)
-        assert abs(answer.result.estimate[k] - value) < 1.02 * half[k], name
-        assert half[k] < 0.2 * abs(value), name
+    assert_held(answer.result, truth, times=1.02, known=dict.fromkeys(truth, 0.2))
 
 
 def unstable(*, held: bool, seed: int) -> pd.DataFrame:

@@ -8,6 +8,8 @@ from host.sysid.estimators import fit_output_error
 from host.sysid.models import LinearModel, Maneuver, read_model
 from host.sysid.numerics import output_problem
 
+from tests.host.sysid.held import assert_held
+
 TEXT = """\
 kind = "equations"
 inputs = ["elevator_rad"]
@@ -67,7 +69,5 @@ def test_two_rates_find_the_servo(late_s: float, tmp_path: Path) -> None:
     model, truth = read_model(path), [*TRUTH[:-1], late_s]
     records = [_record(model, 0.02, 1, truth), _record(model, 0.04, 2, truth)]
     found = fit_output_error(model, records, coloured_noise=False, multiple_starts=False)
-    half = found.half_width()
     assert found.value("servo_s") == pytest.approx(late_s, abs=0.003)
-    for name, value in zip(found.names, truth, strict=False):
-        assert abs(found.value(name) - value) < 1.5 * half[found.index(name)], name
+    assert_held(found, dict(zip(found.names, truth, strict=False)), times=1.5)

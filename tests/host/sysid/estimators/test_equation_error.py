@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 from host.errors import IdentificationError
 from host.sysid import LinearModel, Maneuver, Parameter, Term, fit
-from host.sysid.numerics.coloured_residuals import coloured_score_covariance
 from host.sysid.numerics.differentiation import (
     bandwidth_hz,
     local_polynomial,
     smooth_and_differentiate,
     window_for,
 )
-from scipy import linalg, optimize, signal
+from scipy import optimize, signal
 from studies.data import TRUTH, clean, noisy, with_rates
 from studies.navion import navion, navion_free, navion_structured
 
@@ -22,26 +21,6 @@ def test_clean_rates_give_the_truth(variant: str) -> None:
     A, B, _, _ = result.matrices()
     np.testing.assert_allclose(A, navion()[0], atol=2e-6)
     np.testing.assert_allclose(B, navion()[1], atol=2e-6)
-
-
-def test_ordinary_least_squares_equals_lstsq() -> None:
-    maneuver = with_rates(2, snr=10.0)
-    result = fit("equation-error", navion_free(), [maneuver])
-    z = np.hstack([maneuver.outputs, maneuver.inputs])
-    rates = np.asarray(maneuver.rates, dtype=np.float64)
-    expected = np.linalg.lstsq(np.asarray(z, dtype=np.float64), rates, rcond=None)[0].T
-    A, B, _, _ = result.matrices()
-    np.testing.assert_allclose(np.hstack([A, B]), expected, rtol=1e-8)
-
-
-def test_white_covariance_equals_the_textbook_formula() -> None:
-    maneuver = with_rates(2, snr=10.0)
-    result = fit("equation-error", navion_free(), [maneuver])
-    z = np.hstack([maneuver.outputs, maneuver.inputs])
-    residual = result.residuals[0][:, 2]
-    expected = residual @ residual / (len(z) - 5) * np.linalg.inv(z.T @ z)
-    rows = [result.index(f"a3{k}") for k in (1, 2, 3, 4)] + [result.index("b31")]
-    np.testing.assert_allclose(result.covariance_white[np.ix_(rows, rows)], expected, rtol=1e-6)
 
 
 def test_total_least_squares_equals_the_distance_to_the_plane() -> None:
@@ -110,19 +89,6 @@ def test_smoothing_is_that_of_scipy(samples: int, window: int, derivative: int) 
     ours = local_polynomial(values, window, 3, derivative=derivative, dt_s=0.01)
     peer = signal.savgol_filter(values, window, 3, deriv=derivative, delta=0.01, axis=0)
     np.testing.assert_allclose(ours, peer, atol=1e-9 * 100.0**derivative)
-
-
-@pytest.mark.parametrize("samples", [8, 333, 2000])
-def test_middle_of_the_sandwich_is_that_of_direct_sums(samples: int) -> None:
-    rng = np.random.default_rng(samples)
-    residual, slopes = rng.standard_normal(samples), rng.standard_normal((samples, 3))
-    lags = samples // 5
-    correlation = signal.correlate(residual, residual, method="direct") / samples
-    correlation[np.abs(np.arange(1 - samples, samples)) > lags] = 0.0
-    R = linalg.toeplitz(correlation[samples - 1 :])
-    np.testing.assert_allclose(
-        coloured_score_covariance(residual, slopes), slopes.T @ R @ slopes, rtol=1e-9
-    )
 
 
 def test_differentiated_states_recover_the_structured_model() -> None:

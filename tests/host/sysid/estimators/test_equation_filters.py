@@ -13,6 +13,10 @@ from host.sysid.numerics.process_noise import discrete_noise
 from scipy import linalg
 from scipy.signal import lfilter
 
+from tests.host.sysid.held import assert_held
+
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 DT_S, SAMPLES = 0.05, 50
 ROLL = {
     "kind": "equations",
@@ -32,12 +36,6 @@ LINEAR_ROLL = {
     "B": [["L_da"]],
     "parameters": {"L_p": -4.0, "L_da": 30.0},
 }
-
-
-@pytest.fixture(autouse=True)
-def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run the equations as Python: that takes no compiler's time."""
-    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
 
 
 def rolled(late: int = 0, moved: float = 0.3) -> Maneuver:
@@ -240,7 +238,5 @@ def test_a_stiff_servo_guessed_slow_is_not_where_it_was_guessed() -> None:
     )
     data = [Maneuver(DT_S, u[:, None], (p[::fine] + noise)[:, None])]
     found = fit("extended-kalman", model, data)
-    half = found.half_width()
-    for name, expected in zip(("L_p", "L_da", "w_radps"), truth, strict=True):
-        assert abs(found.value(name) - expected) <= half[found.index(name)], name
+    assert_held(found, dict(zip(("L_p", "L_da", "w_radps"), truth.tolist(), strict=True)))
     assert found.value("w_radps") > 50.0

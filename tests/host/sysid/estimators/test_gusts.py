@@ -4,14 +4,11 @@ import numpy as np
 import pytest
 from host.aircraft import file as aircraft
 from host.aircraft import trim
-from host.aircraft.gains import dimensional_gains
 from host.aircraft.linearisation import linearise
-from host.aircraft.mass_properties import Condition
 from host.sysid.estimators.filter_error import information_at
-from host.sysid.estimators.gust_model import ROLL_GUST
 from host.sysid.numerics import FilterProblem
 from scipy import linalg
-from studies.gusts import AXES, DT_S, fly, gusty_aircraft, spectrum
+from studies.gusts import AXES, fly, gusty_aircraft
 from studies.turbulence import PROCESS, fitted_model, run_case, true_vector
 
 
@@ -32,17 +29,6 @@ def test_coefficients_give_the_linearised_aircraft(axis: str) -> None:
     )
     gain = [np.linalg.solve(a, b)[3] for a, b in ((A, B), (true_A, true_B))]
     np.testing.assert_allclose(gain[0], gain[1], rtol=2e-3)
-
-
-def test_coefficients_are_what_conversion_by_hand_says() -> None:
-    plane = gusty_aircraft()
-    a, V = plane.airframe, plane.airspeed_mps
-    gains = dimensional_gains(a, Condition(V, 0.5 * 1.225 * V**2))
-    force = 0.5 * 1.225 * V**2 * a.wing_area_m2
-    assert gains["M_q"]["Cm_q"] == pytest.approx(force * a.chord_m**2 / (2.0 * V * a.iyy_kgm2))
-    inertia = np.array([[a.ixx_kgm2, -a.ixz_kgm2], [-a.ixz_kgm2, a.izz_kgm2]])
-    rolling = np.linalg.solve(inertia, [force * a.span_m**2 / (2.0 * V), 0.0])
-    assert [gains["L_p"]["Cl_p"], gains["N_p"]["Cl_p"]] == pytest.approx(list(rolling))
 
 
 @pytest.mark.parametrize("axis", list(AXES))
@@ -89,17 +75,3 @@ def test_filter_error_knows_the_air_and_output_error_does_not() -> None:
     assert case.filter_covered >= 0.8
     assert case.output_covered < case.filter_covered
     assert np.all(case.filter_rms < 0.5 * case.output_rms)
-
-
-def test_process_noise_of_the_twin_is_what_its_formulas_say() -> None:
-    air = spectrum("longitudinal", 1.0)
-    assert air.length_m == pytest.approx(100.0)
-    V = gusty_aircraft().airspeed_mps
-    # Stationary variance of the second-order form is that of the intensity.
-    rate = V / air.length_m
-    A = rate * np.array([[-1.0, 0.0], [1.0, -1.0]])
-    P = linalg.solve_continuous_lyapunov(A, -np.diag([air.angle**2, 0.0]))
-    view = np.array([np.sqrt(3.0), 1.0 - np.sqrt(3.0)])
-    assert view @ P @ view * V**2 == pytest.approx(1.0, rel=1e-6)
-    assert ROLL_GUST in fitted_model("lateral").states
-    assert DT_S * rate < 0.1

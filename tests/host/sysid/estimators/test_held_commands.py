@@ -10,15 +10,13 @@ from host.sysid.models import Maneuver, NonlinearModel, equations_from
 from host.sysid.numerics import EquationFilterProblem, NonlinearProblem
 from scipy import linalg
 
+from tests.host.sysid.held import assert_held
+
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 DT_S, SAMPLES = 0.05, 60
 L_P, L_DA, W_RADPS = -5.0, 40.0, 20.0
 FINE = 50  # parts of a sample of which a delay is a multiple
-
-
-@pytest.fixture(autouse=True)
-def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run the equations as Python: that takes no compiler's time."""
-    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
 
 
 def model() -> NonlinearModel:
@@ -88,10 +86,9 @@ def test_the_motion_is_exact_and_so_is_its_slope_by_the_delay(late_s: float) -> 
 def test_a_part_of_a_sample_is_found(method: str) -> None:
     """Spread over the sample, 34 ms were 36.7 +- 1.0 and the servo 9 % too fast, known to 3.5."""
     result = fit(method, model(), [flown(0.034, noise=0.001)])
-    half = result.half_width()
-    for name, truth in (("L_p", L_P), ("L_da", L_DA), ("w_radps", W_RADPS), ("late_s", 0.034)):
-        assert abs(result.value(name) - truth) < half[result.index(name)], name
-        assert result.value(name) == pytest.approx(truth, rel=0.01), name
+    truth = {"L_p": L_P, "L_da": L_DA, "w_radps": W_RADPS, "late_s": 0.034}
+    assert_held(result, truth)
+    assert {name: result.value(name) for name in truth} == pytest.approx(truth, rel=0.01)
 
 
 def test_the_likelihood_of_the_filter_is_best_at_the_part_of_a_sample() -> None:

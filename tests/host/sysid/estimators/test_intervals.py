@@ -1,20 +1,12 @@
 """Noise models and the intervals that stand on them."""
 
 import numpy as np
-import pytest
 from host.sysid import fit
 from host.sysid.numerics.ar_noise import fit_ar, lagged_moments, stabilise
 from scipy import signal
-from studies.coverage import NOISES, coloured_noise
+from studies.coverage import coloured_noise
 from studies.data import noisy
 from studies.navion import navion_structured
-
-
-def test_noise_has_the_power_and_memory_it_claims() -> None:
-    rng = np.random.default_rng(2)
-    noise = coloured_noise(rng, NOISES["AR(1) 0.9"], 200_000, np.array([2.0]))[:, 0]
-    assert noise.std() == pytest.approx(2.0, rel=0.03)
-    assert np.corrcoef(noise[1:], noise[:-1])[0, 1] == pytest.approx(0.9, abs=0.01)
 
 
 def test_given_back_moments_remove_the_bias_of_residuals() -> None:

@@ -46,6 +46,8 @@ def test_unknown_method_and_parameter_are_named() -> None:
         result.value("Q_alpha")
     with pytest.raises(IdentificationError, match="no maneuver"):
         fit("output-error", navion_structured(), [])
+    with pytest.raises(IdentificationError, match="forgetting"):
+        fit("recursive", navion_free(), [quiet()], forgetting=1.5)
 
 
 def test_transform_equals_the_discrete_sum() -> None:
@@ -65,17 +67,6 @@ def test_frequency_output_error_is_exact_without_noise_and_knows_its_error() -> 
     ratio = np.median(frequency.standard_error / time_domain.standard_error[:9])
     assert 0.8 < ratio < 1.3
     assert np.max(np.abs(frequency.estimate - TRUTH) / frequency.standard_error) < 4.0
-
-
-def test_recursive_least_squares_ends_where_the_batch_does() -> None:
-    maneuver = noisy(9)
-    recursive = fit("recursive", navion_free(), [maneuver])
-    batch = fit("equation-error", navion_free(), [maneuver])
-    np.testing.assert_allclose(recursive.estimate, batch.estimate, rtol=1e-3, atol=1e-4)
-    history = np.asarray(recursive.details["history"])
-    assert history.shape == (maneuver.samples, 20)
-    with pytest.raises(IdentificationError, match="forgetting"):
-        fit("recursive", navion_free(), [maneuver], forgetting=1.5)
 
 
 def test_stepwise_drops_what_is_not_there() -> None:
@@ -143,18 +134,6 @@ def test_a_filter_that_has_no_gain_is_no_answer(log_noise: float) -> None:
     theta[-4] = log_noise
     theta[-5] = abs(log_noise)
     assert problem.evaluate(theta) is None
-
-
-def test_kalman_filters_agree_with_output_error() -> None:
-    maneuver = noisy(13, 0.02)
-    reference = fit("output-error", navion_structured(), [maneuver])
-    for method in ("extended-kalman", "unscented-kalman"):
-        result = fit(method, navion_structured(), [maneuver])
-        step = np.abs(result.estimate - reference.estimate[:9]) / reference.standard_error[:9]
-        assert np.median(step) < 1.0
-        assert np.median(result.standard_error / reference.standard_error[:9]) == pytest.approx(
-            1.0, abs=0.35
-        )
 
 
 def test_kalman_filters_say_when_their_noise_model_is_wrong() -> None:

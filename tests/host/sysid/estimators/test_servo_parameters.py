@@ -26,6 +26,7 @@ from host.sysid.numerics import OutputProblem
 from host.sysid.reconstruction import behind_servos
 
 import host
+from tests.host.sysid.held import assert_held
 
 THOR = Path(__file__).resolve().parents[4] / "tests/data/thor75"
 TRUE = {"Z_alpha": -5.0, "Z_de": -0.5, "Z_q": 0.1, "M_alpha": -80.0, "M_q": -8.0, "M_de": -90.0}
@@ -99,9 +100,7 @@ def test_the_delay_moves_with_the_commands_and_pitch_damping_stays() -> None:
     servo, other = found[1]
     assert servo.setting[0] - first.setting[0] == pytest.approx(0.06, abs=0.004)
     assert abs(other.value("M_q") - fitted.value("M_q")) < 0.5 * half[fitted.index("M_q")]
-    for name in ("M_alpha", "M_q", "M_de"):
-        k = fitted.index(name)
-        assert abs(fitted.value(name) - TRUE[name]) < 1.5 * half[k]
+    assert_held(fitted, TRUE, ("M_alpha", "M_q", "M_de"), times=1.5)
 
 
 def test_a_prior_that_knows_the_servo_is_held_to() -> None:

@@ -13,6 +13,7 @@ from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import Trim
 
 from tests.host.sysid.at_hand import identify
+from tests.host.sysid.held import assert_held
 
 Columns = dict[str, np.ndarray]
 MASS_KG, AREA_M2, CHORD_M, IYY_KGM2, ARM_M = 7500.0, 30.0, 2.4, 56e3, 0.5
@@ -147,11 +148,6 @@ def answer_to_flight(
     return answer(flown(1 if stepping else 2, stepping=stepping), method, airframe)
 
 
-def widths(found: Answer) -> dict[str, float]:
-    """Return the half-width of each parameter."""
-    return dict(zip(found.result.names, found.result.half_width(), strict=True))
-
-
 @pytest.mark.parametrize("airframe", [None, AIRCRAFT], ids=["bare", "file"])
 @pytest.mark.parametrize("method", ["flight", "output-error-white"])
 def test_derivatives_hold_while_measured_thrust_steps(
@@ -159,10 +155,8 @@ def test_derivatives_hold_while_measured_thrust_steps(
 ) -> None:
     """M_alpha was -1.5 +- 7.5, truth -5.8; D_V was +0.01 +- 0.27, truth -0.016."""
     found = answer_to_flight(method, airframe)
-    true, half = true_derivatives(found.trim), widths(found)
-    for name in PRINCIPAL:
-        assert abs(found.result.value(name) - true[name]) < half[name], name
-        assert half[name] < (0.25 if name == "D_V" else 0.06) * abs(true[name]), name
+    known = dict.fromkeys(PRINCIPAL, 0.06) | {"D_V": 0.25}
+    assert_held(found.result, true_derivatives(found.trim), known=known)
     assert THRUST_AS_INPUT in found.result.warnings
 
 
@@ -189,10 +183,7 @@ def test_measured_power_gives_thrust_and_is_as_good_in_what_it_is_not_in() -> No
     power = columns["thrust_n"] * columns["airspeed_mps"] / 0.66
     bare = {n: v for n, v in columns.items() if n != "thrust_n"}
     found = answer({**bare, "power_w": power}, "output-error-white", AIRCRAFT)
-    true, half = true_derivatives(found.trim), widths(found)
-    for name in PRINCIPAL:
-        assert abs(found.result.value(name) - true[name]) < half[name], name
-    assert half["D_V"] < 0.25 * abs(true["D_V"])
+    assert_held(found.result, true_derivatives(found.trim), PRINCIPAL, known={"D_V": 0.25})
     assert with_thrust(bare, None) is bare
 
 

@@ -13,11 +13,13 @@ from studies import short_records
 from studies.wrong_flights import NOISE_SD, TRUTH
 
 from tests.host.sysid.at_hand import identify
+from tests.host.sysid.held import assert_held
 from tests.host.sysid.verdicts import verdict_of
 
 DT_S = 0.02
 TRIM = Trim(17.0, 0.06, 0.06)
 RELIED_ON = ("trust", "use with care")
+YAW = ("N_beta", "N_r", "N_dr")
 Columns = dict[str, Array]
 
 
@@ -56,10 +58,7 @@ def test_a_short_dutch_roll_holds_the_truth_though_wings_roll(length_s: float) -
     seed = 0
     columns = doublet("rudder_rad", 0.12, 0.5, length_s, seed)
     found = answer(columns, "dutch-roll", "rudder_rad")
-    half = found.result.half_width()
-    for name in ("N_beta", "N_r", "N_dr"):
-        error = found.result.value(name) - TRUTH["lateral"][name]
-        assert abs(error) <= 1.3 * half[found.result.index(name)], (seed, name)
+    assert_held(found.result, TRUTH["lateral"], YAW, times=1.3)
     assert verdict_of(found).marks["N_dr"] in RELIED_ON
 
 
@@ -70,11 +69,7 @@ def test_noise_of_the_roll_rate_takes_no_yaw_by_rolling_for_known(length_s: floa
     seed = 25100
     columns, window = short_records.record(aircraft, 0.0, "dutch-roll", length_s, seed)
     [found] = identify(columns, names=("dutch-roll",), windows=(window,), maker="foreign")
-    half = found.result.half_width()
-    for name in ("N_beta", "N_r", "N_dr"):
-        error = found.result.value(name) - aircraft.truth[name]
-        assert abs(error) <= half[found.result.index(name)], (seed, name)
-    assert half[found.result.index("N_beta")] < 0.3 * aircraft.truth["N_beta"]
+    assert_held(found.result, aircraft.truth, YAW, known={"N_beta": 0.3})
 
 
 def test_roll_damping_beside_sideslip_is_right_and_trusted() -> None:
@@ -91,10 +86,7 @@ def test_bank_that_nobody_measured_is_that_of_rolling() -> None:
     whole = answer(columns, "dutch-roll", "rudder_rad").result
     del columns["phi_rad"]
     found = answer(columns, "dutch-roll", "rudder_rad").result
-    half = whole.half_width()
-    for name in ("N_beta", "N_r", "N_dr"):
-        k = whole.index(name)
-        assert abs(found.value(name) - whole.value(name)) < half[k]
+    assert_held(whole, {name: found.value(name) for name in YAW})
 
 
 @pytest.mark.parametrize(("without", "method"), [("p_radps", "flight"), ("", "equation-error")])
@@ -104,7 +96,7 @@ def test_rolling_that_nothing_accounts_for_is_not_relied_on(without: str, method
     found = answer(columns, "dutch-roll", "rudder_rad", method)
     marks = verdict_of(found).marks
     assert found.left_out == ("p_radps",)
-    assert not any(marks[name] in RELIED_ON for name in ("N_beta", "N_r", "N_dr"))
+    assert not any(marks[name] in RELIED_ON for name in YAW)
 
 
 def gusty(name: str, seed: int, length_s: float, side_mps: float, method: str = "flight") -> Answer:
@@ -122,13 +114,11 @@ def test_side_gusts_are_a_state_of_a_short_dutch_roll(name: str) -> None:
     truth = short_records.fleet()[name].truth
     seed = 25000
     found = gusty(name, seed, 5.0, 0.3)
-    half, marks = found.result.half_width(), verdict_of(found).marks
     assert found.method == "filter-error-gust"
-    for one in ("N_beta", "N_r", "N_dr"):
-        error = found.result.value(one) - truth[one]
-        assert abs(error) <= 1.1 * half[found.result.index(one)], (seed, one)
-    assert marks["N_dr"] in RELIED_ON
+    assert_held(found.result, truth, YAW, times=1.1)
+    assert verdict_of(found).marks["N_dr"] in RELIED_ON
     # Of one deviation of N_p alone, which nothing tells better than its prior.
+    half = found.result.half_width()
     assert half[found.result.index("N_beta")] > 0.1 * truth["N_beta"]
 
 
@@ -145,10 +135,7 @@ def test_the_gust_filter_asked_for_counts_what_the_template_leaves_out() -> None
     """N_beta was 11 % large, known to 1."""
     truth = short_records.fleet()["trainer"].truth
     found = gusty("trainer", 25120, 3.0, 0.3, "filter-error-gust")
-    half = found.result.half_width()
-    for one in ("N_beta", "N_r", "N_dr"):
-        error = found.result.value(one) - truth[one]
-        assert abs(error) <= half[found.result.index(one)], one
+    assert_held(found.result, truth, YAW)
     assert found.left_out == ()
 
 

@@ -16,6 +16,8 @@ from host.sysid.maneuvers.maneuver_detection import DetectedManeuver
 from host.sysid.models import LinearModel, Maneuver, model_from
 from scipy import signal
 
+from tests.host.sysid.held import assert_held
+
 DT_S, SAMPLES, FINE, AIRSPEED_MPS = 0.02, 500, 5, 17.0
 A = np.array([[-6.0, 1.0], [-80.0, -9.0]])
 B = np.array([-0.9, -90.0])
@@ -78,10 +80,7 @@ def test_the_noise_of_the_data_chooses_the_method_and_it_is_said(
     found = fit_by_evidence(short_period(), [flown(kind)], AIRSPEED_MPS)
     assert found.method == method
     assert words in found.remarks[0]
-    half = found.result.half_width()
-    for name, value in TRUTH.items():
-        k = found.result.index(name)
-        assert abs(found.result.estimate[k] - value) < 1.8 * half[k], name
+    assert_held(found.result, TRUTH, times=1.8)
 
 
 def test_without_airspeed_the_states_themselves_are_driven() -> None:
@@ -121,10 +120,7 @@ def test_slow_columns_tell_delays_as_well_as_their_step_allows() -> None:
     for slow in ([True, False], [True, True]):
         found = fit_by_evidence(model, with_slow(slow), AIRSPEED_MPS)
         assert found.method == "filter-error-gust"
-        half = found.result.half_width()
-        for name in ("M_alpha", "M_q", "M_de"):
-            k = found.result.index(name)
-            assert abs(found.result.estimate[k] - TRUTH[name]) < half[k], name
+        assert_held(found.result, TRUTH, ("M_alpha", "M_q", "M_de"))
         value_s, half_s[slow[1]] = found.delays["gyro_s"]
         assert abs(value_s) < half_s[slow[1]]
     assert half_s[True] > 1.96 * 0.02 * 4.0 * DT_S  # rows of two samples of 40 ms

@@ -1,6 +1,7 @@
 """--maneuver, --from and --to: each sample is fitted once, and what cannot be is said why."""
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -38,12 +39,9 @@ SHORT_PERIOD = model_from(
 
 
 @pytest.fixture(scope="module")
-def flight(tmp_path_factory: pytest.TempPathFactory) -> Columns:
+def flight(simulated: Callable[[str, int], Path]) -> Columns:
     """Calm air: a 3-2-1-1 and a doublet of the elevator, doublets of aileron and rudder."""
-    folder = tmp_path_factory.mktemp("calm")
-    options = ["--seed", "3", "--firmware", "none", "--no-picture", "-o", str(folder)]
-    assert main(["simulate", "calm", *options]) == 0
-    return read_columns(folder / "flight.csv")[0]
+    return read_columns(simulated("calm", 3) / "flight.csv")[0]
 
 
 def fitted(columns: Columns, **options: Any) -> list[tuple[float, float]]:

@@ -19,10 +19,9 @@ from host.sysid.models.diagnostics import (
     identifiability_flags,
     reference_values,
     signal_fits,
-    whiteness,
 )
 from host.sysid.models.modal_analysis import modes
-from scipy import signal, stats
+from scipy import stats
 from studies.data import noisy
 from studies.navion import navion, navion_free, navion_structured
 
@@ -40,16 +39,6 @@ def test_figures_of_fit_equal_their_definitions() -> None:
     model = y - e
     expected = np.sqrt(np.mean(e**2)) / (np.sqrt(np.mean(y**2)) + np.sqrt(np.mean(model**2)))
     assert figures.theil == pytest.approx(expected)
-
-
-def test_whiteness_tells_white_from_coloured() -> None:
-    rng = np.random.default_rng(2)
-    p_values = [whiteness([rng.standard_normal(1000)])[1] for _ in range(200)]
-    assert 0.01 <= np.mean(np.array(p_values) < 0.05) <= 0.10
-    coloured = signal.lfilter([1.0], [1.0, -0.3], rng.standard_normal(1000))
-    outside, p_value = whiteness([coloured])
-    assert p_value < 1e-6
-    assert outside > 0.04
 
 
 def test_navion_is_answered_and_the_thesis_example_is_refused() -> None:

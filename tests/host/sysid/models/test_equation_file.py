@@ -13,6 +13,8 @@ from host.sysid.models import Maneuver, NonlinearModel, read_model
 from host.sysid.models.equation_text import equation_text
 from host.sysid.numerics import NonlinearProblem
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 TEXT = """\
 kind = "equations"
 name = "pitch"
@@ -47,12 +49,6 @@ outputs = ["elevator_rad"]
 CHAIN = "".join(
     f'd{k} = "' + f"+sin({'lift' if k == 0 else f'd{k - 1}'})" * 150 + '"\n' for k in range(199)
 )
-
-
-@pytest.fixture(autouse=True)
-def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run the equations as Python, as where numba is missing: that takes no compiler's time."""
-    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
 
 
 def test_a_file_says_what_a_model_is(tmp_path: Path) -> None:

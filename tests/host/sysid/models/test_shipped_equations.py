@@ -11,14 +11,10 @@ from host.arrays import Array
 from host.sysid.models import Maneuver, NonlinearModel, read_model
 from host.sysid.numerics import NonlinearProblem
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 FOLDER = Path(str(files("host.sysid.models").joinpath("equations")))
 G = 9.80665
-
-
-@pytest.fixture(autouse=True)
-def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run the equations as Python: that takes no compiler's time."""
-    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
 
 
 def shipped(name: str) -> NonlinearModel:

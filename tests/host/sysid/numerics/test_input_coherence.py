@@ -110,12 +110,10 @@ def test_output_error_widens_by_what_its_noise_had_explained() -> None:
     assert not any("follows the inputs" in w for w in right.warnings)
 
 
+@pytest.mark.usefixtures("interpreted")
 @pytest.mark.parametrize(("kind", "named"), [("columns", ()), ("inputs", ("p_radps",))])
-def test_a_measured_column_is_no_input_of_a_pilot(
-    monkeypatch: pytest.MonkeyPatch, kind: str, named: tuple[str, ...]
-) -> None:
+def test_a_measured_column_is_no_input_of_a_pilot(kind: str, named: tuple[str, ...]) -> None:
     """Thrust follows the air that the output feels: no error of the model."""
-    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
     document: dict[str, Any] = {
         "kind": "equations",
         "inputs": ["aileron_rad"],

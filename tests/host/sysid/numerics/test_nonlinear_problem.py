@@ -9,14 +9,10 @@ from host.sysid.models import LinearModel, Maneuver, Parameter, Term, equations_
 from host.sysid.numerics import NonlinearProblem, OutputProblem
 from scipy import signal
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 DT_S = 0.04
 TRUTH = {"bandwidth": 40.0, "M_q": -2.0, "M_de": -25.0}
-
-
-@pytest.fixture(autouse=True)
-def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run the equations as Python: that takes no compiler's time."""
-    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
 
 
 def test_a_model_that_is_stiffer_than_at_its_start_is_stepped_finer() -> None:

@@ -17,6 +17,8 @@ from scipy import integrate
 
 import host
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 TEXT = """\
 kind = "equations"
 name = "pitch with a bend"
@@ -42,12 +44,6 @@ q_bias_radps = { each_record = true, prior_sd = 0.05 }
 TRUTH = {"Za": -5.0, "gust_aa": 4.0, "Z0": 0.1, "Ma": -50.0, "Mq": -5.0, "Mde": -60.0, "M0": -0.5}
 BIAS = (0.02, -0.03)
 DT_S, SAMPLES = 0.04, 40
-
-
-@pytest.fixture(autouse=True)
-def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run the equations as Python: that takes no compiler's time."""
-    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
 
 
 def flown(model: Path) -> list[pd.DataFrame]:

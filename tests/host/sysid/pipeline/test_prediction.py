@@ -126,10 +126,8 @@ outputs = ["alpha_rad"]
 """
 
 
-def test_equations_that_are_linear_predict_as_the_linear_model(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
+@pytest.mark.usefixtures("interpreted")
+def test_equations_that_are_linear_predict_as_the_linear_model(tmp_path: Path) -> None:
     own, plain = tmp_path / "own.toml", tmp_path / "plain.toml"
     own.write_text(EQUATIONS, encoding="utf-8")
     text = "\n".join(f"{k} = {json.dumps(v)}" for k, v in MODEL.items() if k != "parameters")
@@ -149,11 +147,9 @@ def test_equations_that_are_linear_predict_as_the_linear_model(
             )
 
 
-def test_equations_start_from_the_trim_where_nothing_is_fitted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("interpreted")
+def test_equations_start_from_the_trim_where_nothing_is_fitted(tmp_path: Path) -> None:
     """From the mean of 0.3 s, not from one sample, which an outlier would make another flight."""
-    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
     path = tmp_path / "own.toml"
     path.write_text(EQUATIONS, encoding="utf-8")
     table = recorded(2, noise=0.0)
@@ -167,11 +163,9 @@ def test_equations_start_from_the_trim_where_nothing_is_fitted(
     assert "nothing fitted: from the mean of the 0.3 s" in found.to_text()
 
 
-def test_the_delay_of_a_command_is_held_too(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("interpreted")
+def test_the_delay_of_a_command_is_held_too(tmp_path: Path) -> None:
     """It was left out: q of the record that was fitted differed by 25 in place of 4 %."""
-    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
     late = recorded(2)
     late["elevator_rad"] = np.interp(late["t_s"] + 0.06, late["t_s"], late["elevator_rad"])
     fitted, left_out = tmp_path / "fitted.toml", tmp_path / "left_out.toml"
