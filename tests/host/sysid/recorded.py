@@ -11,6 +11,7 @@ from host.sysid.coefficients import Window
 from host.sysid.reconstruction import Compatibility, reconstruct
 from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight
+from studies import wrong_flights
 
 from tests.host.logs import ROOT
 
@@ -19,6 +20,7 @@ NAME = "ultrastick25e"
 # servos, which two tests of an instrument leave out.
 STRAIGHT_ON = str(ROOT / "tests" / "data" / "straight_on.toml")
 Columns = dict[str, np.ndarray]
+linear_flight = lru_cache(maxsize=12)(wrong_flights.fly)  # of a linear aircraft
 
 
 @lru_cache(maxsize=5)

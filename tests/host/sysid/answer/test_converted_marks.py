@@ -14,9 +14,9 @@ from host.sysid.answer.marks import SMALL, UNSURE
 from host.sysid.answer.summary_rows import summary_rows
 from host.sysid.linear import Answer
 from host.sysid.pipeline.estimate_table import estimate_table
-from studies.wrong_flights import fly
 
 from tests.host.sysid.at_hand import identify
+from tests.host.sysid.recorded import linear_flight
 from tests.host.sysid.verdicts import verdict_of
 
 WIDTHS = (0.0, 0.05, 0.0999, 0.1001, 0.3, 0.31, 2.0)
@@ -24,7 +24,7 @@ WIDTHS = (0.0, 0.05, 0.0999, 0.1001, 0.3, 0.31, 2.0)
 
 @pytest.fixture(scope="module")
 def answer() -> Answer:
-    flight = fly("short-period", "none", "white", 1)
+    flight = linear_flight("short-period", "none", "white", 1)
     [found] = identify(
         flight.columns, names=("short-period",), method="output-error",
         windows=flight.windows, user_model=flight.model,

@@ -11,9 +11,10 @@ from host.sysid.checks import Finding
 from host.sysid.estimators.servo_parameters import SERVO, ServoEstimate, ServoNumber
 from host.sysid.linear import Answer
 from host.sysid.models import Trim, template
-from studies.wrong_flights import LinearFlight, fly
+from studies.wrong_flights import LinearFlight
 
 from tests.host.sysid.at_hand import identify
+from tests.host.sysid.recorded import linear_flight
 from tests.host.sysid.verdicts import verdict_lines, verdict_of
 
 RELIED_ON = (TRUSTED, CAREFUL)
@@ -42,7 +43,7 @@ def reason(answer: Answer, name: str, evidence: Evidence | None = None) -> str:
 
 @pytest.fixture(scope="module")
 def flight() -> LinearFlight:
-    return fly("short-period", "none", "white", 1)
+    return linear_flight("short-period", "none", "white", 1)
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +74,7 @@ def test_what_is_not_predicted_is_evidence_and_no_veto(right: Answer) -> None:
 
 def test_what_inputs_drive_beside_the_model_is_in_the_interval() -> None:
     """A lag that no column shows moves M_q by 14 of the intervals that noise alone gives."""
-    flight = fly("short-period", "hidden lag", "white", 1)
+    flight = linear_flight("short-period", "hidden lag", "white", 1)
     answer = answer_to(flight)
     assert answer.coherence is not None
     assert "q_radps" in answer.coherence.coherent
@@ -103,7 +104,7 @@ def test_an_estimate_on_its_bound_is_not_relied_on(flight: LinearFlight) -> None
 def test_an_impossible_sign_is_not_relied_on(
     template_name: str, impossible: dict[str, str]
 ) -> None:
-    right = fly(template_name, "none", "white", 2)
+    right = linear_flight(template_name, "none", "white", 2)
     turned = right.columns | {column: -right.columns[column] for column in impossible}
     answer = answer_to(replace(right, columns=turned), template_name)
     for name in impossible.values():
@@ -126,7 +127,7 @@ def test_a_sign_counts_however_narrow_the_interval(right: Answer, name: str, bes
 
 def test_an_airspeed_in_doubt_takes_the_forces_over_it() -> None:
     """It is no state of the model: nothing was taken, and half of Y_beta stood under "trust"."""
-    answer = answer_to(fly("lateral", "none", "white", 1), "lateral")
+    answer = answer_to(linear_flight("lateral", "none", "white", 1), "lateral")
     evidence = Evidence((Finding("beta-against-ay", ("airspeed_mps",), "in kt?"),))
     lost = relied_on(answer) - relied_on(answer, evidence)
     assert lost

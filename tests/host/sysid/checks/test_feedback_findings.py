@@ -21,11 +21,11 @@ from host.sysid.flight import read_flight_columns
 from host.sysid.linear import Answer
 from host.sysid.maneuvers import detect_maneuvers, select_maneuvers
 from host.sysid.models import Term
-from studies.wrong_flights import fly
 
 from tests.host.logs import ROOT
 from tests.host.sysid.at_hand import identify
 from tests.host.sysid.closed_loop import DT_S, Law, doublets, flown
+from tests.host.sysid.recorded import linear_flight
 from tests.host.sysid.verdicts import verdict_of
 
 SAMPLES = 1600
@@ -202,7 +202,7 @@ def test_a_damper_engaged_after_the_rest_before_an_input_is_named() -> None:
 @pytest.fixture(scope="module")
 def answer() -> Answer:
     """Rudder and ailerons by a pilot: what a law would take away is all there."""
-    flight = fly("lateral", "none", "white", 1)
+    flight = linear_flight("lateral", "none", "white", 1)
     [answer] = identify(
         flight.columns, names=("lateral",), method="output-error-white", windows=flight.windows
     )

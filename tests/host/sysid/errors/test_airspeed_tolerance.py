@@ -9,9 +9,10 @@ from host.instrument.instrument_errors import usual_errors
 from host.physical.recording import AUTOPILOT, FOREIGN, OWN
 from host.sysid.answer import TRUSTED
 from host.sysid.linear import Answer
-from studies.wrong_flights import TRUTH, fly
+from studies.wrong_flights import TRUTH
 
 from tests.host.sysid.at_hand import identify
+from tests.host.sysid.recorded import linear_flight
 from tests.host.sysid.verdicts import verdict_of
 
 SEED = 14790
@@ -19,7 +20,7 @@ SEED = 14790
 
 def answer_to(noise: str, fault: str, seed: int, maker: str = FOREIGN) -> Answer:
     """The default answer to a linear flight in some noise."""
-    flight = fly("short-period", fault, noise, seed)
+    flight = linear_flight("short-period", fault, noise, seed)
     [answer] = identify(
         flight.columns, names=("short-period",), windows=flight.windows, maker=maker
     )

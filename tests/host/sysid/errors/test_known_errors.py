@@ -19,7 +19,9 @@ from host.sysid.reconstruction.reconstruction import by_calibration_alone
 from studies.foreign.flight import Air
 from studies.foreign.instrument import SENSORS_FILE
 from studies.independent import NAMES, answer_with_file
-from studies.wrong_flights import TRUTH, fly
+from studies.wrong_flights import TRUTH
+
+from tests.host.sysid.recorded import linear_flight
 
 SEED = 24310
 
@@ -42,7 +44,7 @@ def test_a_right_flight_in_calm_air_stays_under_trust(axis: str, may_be_said: bo
 
 def test_a_deviation_of_a_scale_is_a_share_of_what_was_simulated() -> None:
     """A share of the measured output would be found by the noise that it has of it."""
-    flight = fly("short-period", "none", "white", 3)
+    flight = linear_flight("short-period", "none", "white", 3)
     trim = Trim(17.0, 0.06, 0.06)
     model = template("short-period", trim)
     names = model.outputs

@@ -27,7 +27,6 @@ from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.numerics import OutputProblem
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
-from studies import wrong_flights
 from studies.foreign.flight import derivatives as foreign_derivatives
 from studies.foreign.flight import fly as fly_foreign
 from studies.independent import cells
@@ -36,6 +35,7 @@ from studies.linear import derivatives
 import host
 from tests.host.sysid.at_hand import identify
 from tests.host.sysid.held import assert_held
+from tests.host.sysid.recorded import linear_flight
 
 NAME = "ultrastick25e"
 Columns = dict[str, np.ndarray]
@@ -239,7 +239,7 @@ def test_a_fit_that_ran_away_is_one_line(
 
 def test_a_linear_record_has_no_departures() -> None:
     """Level flight guessed in place of q bent it: L_p was known to 1.4 % and inputs drove p."""
-    flight = wrong_flights.fly("lateral", "none", "white", 1)
+    flight = linear_flight("lateral", "none", "white", 1)
     [answer] = identify(
         flight.columns, names=("lateral",), method="output-error", windows=flight.windows
     )

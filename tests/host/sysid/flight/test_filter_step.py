@@ -10,9 +10,9 @@ from host.sysid.linear.linear_model import template_and_method
 from host.sysid.maneuvers import DetectedManeuver
 from host.sysid.models import Trim, template
 from host.sysid.reconstruction import Compatibility
-from studies.wrong_flights import fly
 
 from tests.host.sysid.at_hand import identify
+from tests.host.sysid.recorded import linear_flight
 
 NAMES = (
     "airspeed_mps", "alpha_rad", "q_radps", "theta_rad", "ax_mps2", "az_mps2", "elevator_rad",
@@ -101,7 +101,7 @@ def test_without_an_aircraft_file_tables_of_others_are_fitted_with_rolling_gusts
     maker: str, method: str
 ) -> None:
     """In gusts output error knows N_dr to 11 % and misses N_r on an independent simulator by 24."""
-    flight = fly("lateral", "none", "gust", 1200)
+    flight = linear_flight("lateral", "none", "gust", 1200)
     [answer] = identify(flight.columns, names=("lateral",), windows=flight.windows, maker=maker)
     assert answer.method == method
     off = abs(answer.result.value("N_dr") - flight.truth["N_dr"])

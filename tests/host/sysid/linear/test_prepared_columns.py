@@ -1,17 +1,20 @@
 """The record of columns says what was done to each column that a model was fitted to, no more."""
 
 from dataclasses import replace
+from functools import cache
 
 import pytest
 from host.physical.recording import FOREIGN, OWN, Recording
 from host.sysid.flight import FlownManeuver, changed_columns
 from host.sysid.linear import LinearEstimate, LinearEstimator
 from host.sysid.pipeline import at_hand, prepare
-from studies.wrong_flights import fly
+
+from tests.host.sysid.recorded import linear_flight
 
 
+@cache
 def estimate_of(recording: Recording) -> LinearEstimate:
-    flown = fly("short-period", "none", "white", 1)
+    flown = linear_flight("short-period", "none", "white", 1)
     given = at_hand(flown.columns, recording=recording, windows=flown.windows)
     return LinearEstimator("short-period").estimate([prepare(given).flight])
 
