@@ -7,8 +7,6 @@ import pytest
 from host.arrays import BoolArray
 from host.sysid.models import LinearModel, Maneuver, Parameter, Term
 from host.sysid.numerics import FilterProblem, InnovationLikelihood
-from host.sysid.numerics.process_noise import discrete_noise
-from scipy import stats
 
 DT_S, SAMPLES = 0.05, 40
 PROCESS = ("gust_rad",)
@@ -75,49 +73,6 @@ def known(point: InnovationLikelihood | None) -> InnovationLikelihood:
     """Return a point that must be there."""
     assert point is not None
     return point
-
-
-def dense_moments(problem: FilterProblem, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return joint mean and covariance of all that was measured."""
-    model, maneuver = problem.model, problem.maneuvers[0]
-    A, _, C, _ = model.matrices(theta)
-    one, drive = problem.sampled(0, theta), problem.output_problem.drive(0)
-    intensity, power = problem.noise(theta)
-    steady = known(problem.evaluate(theta)).filters[0]
-    F, Q = discrete_noise(A, intensity, DT_S)
-    mean, x, n = [], one.start, len(A)
-    spread = np.zeros((SAMPLES * n, SAMPLES * n))
-    P = steady.P
-    for k in range(SAMPLES):
-        mean.append(one.read @ np.concatenate([x, drive[k]]))
-        cross = P
-        for later in range(k, SAMPLES):
-            spread[later * n : later * n + n, k * n : k * n + n] = cross
-            spread[k * n : k * n + n, later * n : later * n + n] = cross.T
-            cross = F @ cross
-        x, P = one.step @ np.concatenate([x, drive[k]]), F @ P @ F.T + Q
-    rows = np.kron(np.eye(SAMPLES), C)
-    covariance = rows @ spread @ rows.T + np.diag(np.tile(power, SAMPLES))
-    seen = maneuver.seen.ravel()
-    return np.concatenate(mean)[seen], covariance[np.ix_(seen, seen)]
-
-
-def dense_log_density(problem: FilterProblem, theta: np.ndarray) -> float:
-    """Return the log density of all that was measured, by its joint mean and covariance."""
-    maneuver = problem.maneuvers[0]
-    measured = maneuver.outputs.ravel()[maneuver.seen.ravel()]
-    return float(stats.multivariate_normal.logpdf(measured, *dense_moments(problem, theta)))
-
-
-@pytest.mark.parametrize("kind", ["each fifth", "at random", "all"])
-def test_the_likelihood_is_that_of_the_joint_normal(kind: str) -> None:
-    problem, theta = problem_of(kind)
-    shifted = theta + 0.1
-    expected = [dense_log_density(problem, t) for t in (theta, shifted)]
-    found = [-known(problem.evaluate(t)).cost for t in (theta, shifted)]
-    count = int(sampled(kind).sum())
-    assert found[0] - 0.5 * count * np.log(2.0 * np.pi) == pytest.approx(expected[0], rel=1e-9)
-    assert found[1] - found[0] == pytest.approx(expected[1] - expected[0], rel=1e-8)
 
 
 def test_what_is_all_measured_is_the_steady_filter() -> None:
