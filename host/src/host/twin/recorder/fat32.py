@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import mmap
 import struct
+import sys
 from dataclasses import dataclass
 
 SECTOR = 512
@@ -56,7 +57,7 @@ def format_card(
     clusters = (sectors - RESERVED - 2 * fat_sectors) // SECTORS_PER_CLUSTER
     if clusters < 65525:
         raise CardImageError(f"{size_bytes} bytes make {clusters} clusters, expected 65525 or more")
-    image = mmap.mmap(-1, size_bytes)
+    image = unwritten_card(size_bytes)
     entry = struct.pack(
         "<B3sB3sII", 0, b"\x20\x21\x00", 0x0C, b"\xfe\xff\xff", PARTITION_START, sectors
     )
@@ -81,6 +82,13 @@ def format_card(
         image[fat : fat + 12] = struct.pack("<III", 0x0FFFFFF8, 0x0FFFFFFF, 0x0FFFFFFF)
         image[fat + 12 : fat + 12 + 4 * taken] = struct.pack("<I", 0x0FFFFFFF) * taken
     return image
+
+
+def unwritten_card(size_bytes: int = CARD_BYTES) -> mmap.mmap:
+    """Return a card of zeros: memory of this process alone, of which reading takes none."""
+    if sys.platform == "win32":
+        return mmap.mmap(-1, size_bytes)
+    return mmap.mmap(-1, size_bytes, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
 
 
 class CardReader:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from host.errors import UsageError
 from host.twin.faults import Action, Fault, recorder_actions
 from host.twin.flight.stick_commands import IDLE_US, NEUTRAL_US
-from host.twin.recorder.fat32 import CARD_BYTES, CardImageError, CardReader, format_card
+from host.twin.recorder.fat32 import CardImageError, CardReader, format_card, unwritten_card
 from host.twin.recorder.flight_card_line import eeprom_with_card
 from host.twin.recorder.recorder_build import recorder_library
 from host.twin.recorder.sitl_library import TICKS_PER_US, CardFault, Port, Sitl
@@ -236,7 +236,7 @@ def card_image(faults: Sequence[Fault], file_blocks: int | None = None) -> mmap.
     """
     kinds = {fault.kind for fault in faults}
     if "card_unformatted" in kinds:
-        return mmap.mmap(-1, CARD_BYTES)
+        return unwritten_card()
     image = format_card(full="card_full" in kinds)
     sitl = Sitl(recorder_library())
     try:
