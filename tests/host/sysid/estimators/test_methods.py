@@ -6,7 +6,6 @@ from host.errors import IdentificationError
 from host.sysid import FitResult, Maneuver, fit, methods
 from host.sysid.estimators.kalman import innovation_inflation
 from host.sysid.numerics import FilterProblem, OutputProblem, minimise
-from host.sysid.numerics.chirp_z import transform
 from scipy import linalg, signal
 from studies.data import TRUTH, clean, gusty, noisy
 from studies.navion import navion, navion_free, navion_structured
@@ -48,14 +47,6 @@ def test_unknown_method_and_parameter_are_named() -> None:
         fit("output-error", navion_structured(), [])
     with pytest.raises(IdentificationError, match="forgetting"):
         fit("recursive", navion_free(), [quiet()], forgetting=1.5)
-
-
-def test_transform_equals_the_discrete_sum() -> None:
-    rng = np.random.default_rng(1)
-    values = rng.standard_normal((50, 2))
-    f = np.array([0.3, 0.8, 1.3, 1.8])
-    expected = np.exp(-2j * np.pi * np.outer(f, np.arange(50) * 0.1)) @ values
-    np.testing.assert_allclose(transform(values, 0.1, f), expected, rtol=1e-10)
 
 
 def test_frequency_output_error_is_exact_without_noise_and_knows_its_error() -> None:
@@ -111,19 +102,6 @@ def test_filter_error_beats_output_error_in_turbulence_and_knows_its_error() -> 
     assert np.max(np.abs(ours / plain)[[3, 5, 6]]) < 0.85  # Z_alpha, M_alpha, M_q
     assert np.max(np.abs(ours) / result.standard_error[:9]) < 4.0
     np.testing.assert_allclose(result.details["process_deviation"], [0.02, 0.1], rtol=0.25)
-
-
-def test_filter_error_without_process_noise_is_output_error() -> None:
-    maneuver = noisy(12)
-    model = navion_structured()
-    problem = FilterProblem(model, [maneuver], ("alpha_rad",))
-    inner = OutputProblem(model, [maneuver])
-    theta = np.concatenate([TRUTH, np.zeros(4), [-40.0], np.log([1.0, 0.1, 0.1, 0.1])])
-    point = problem.evaluate(theta)
-    response = inner.respond(theta[:13])
-    assert point is not None
-    assert response is not None
-    np.testing.assert_allclose(point.e[0].T, inner.measured(0) - response[0].y, atol=1e-8)
 
 
 @pytest.mark.parametrize("log_noise", [-400.0, 340.0])
