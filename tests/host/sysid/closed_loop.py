@@ -44,6 +44,9 @@ def flown(name: str, inputs: dict[str, Array], law: Law | None, seed: int) -> di
         middles = (np.arange(count) + 0.5) / FINE
         moved[:, at] = np.interp(middles, np.arange(len(values)), values)
     own = np.zeros(count)
+    winds = np.outer(gust, A[:, vane]) + moved @ B.T
+    ahead = np.eye(len(A)) + 0.5 * dt * A  # by the wind; by the state one more of it
+    F, G = np.eye(len(A)) + dt * A @ ahead, dt * ahead
     x, lagged, slow = np.zeros((count + 1, len(A))), 0.0, 0.0
     for k in range(count):
         if law is not None:
@@ -52,10 +55,8 @@ def flown(name: str, inputs: dict[str, Array], law: Law | None, seed: int) -> di
             lagged += (value - lagged) * (dt / law.lag_s if law.lag_s else 1.0)
             slow += (lagged - slow) * dt / law.washout_s
             own[k] = lagged - slow
-            moved[k, model.inputs.index(law.surface)] += own[k]
-        wind = A[:, vane] * gust[k] + B @ moved[k]
-        middle = x[k] + 0.5 * dt * (A @ x[k] + wind)
-        x[k + 1] = x[k] + dt * (A @ middle + wind)
+            winds[k] += B[:, model.inputs.index(law.surface)] * own[k]
+        x[k + 1] = F @ x[k] + G @ winds[k]
     if law is not None:
         given[:, model.inputs.index(law.surface)] += own[::FINE]
     states = x[:-1:FINE].copy()
