@@ -22,6 +22,7 @@ import numpy as np
 from flight.images import build_image
 from flight.rig import check_card, make_card, take_log
 from flight.servos import LONGEST_GAP_MS, worst_gap_ms
+from host.log import read_log  # here: each child of in_fork would load it anew
 from host.wire.schema_text import packed_schema
 from imu.motion import fly, swaying
 from imu.record import ImuRecord, read_record
@@ -258,8 +259,6 @@ def part(rows: NDArray[np.bool_]) -> float:
 
 def run_fault(rig: PairRig, fault: Fault, folder: Path) -> Outcome:
     """Fly on from the state of the rig with a fault; only in a child of in_fork."""
-    import host
-
     chip = rig.board.chip
     since = rig.mega.cycle
     chip.clear_statistics()
@@ -278,7 +277,7 @@ def run_fault(rig: PairRig, fault: Fault, folder: Path) -> Outcome:
     rig.mega.power_off()
     card = rig.flight.save_card(folder / "card.img")
     check_card(card)
-    log = host.read_log(take_log(card, folder / "flight.bin"))
+    log = read_log(take_log(card, folder / "flight.bin"))
     start_us, end_us, done_us = ((at - rig.mega_zero_cycle) / 16 for at in (since, until, done))
     ident = log.frames["ident"]
     reset = "reset" in fault.events

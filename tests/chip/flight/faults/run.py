@@ -13,6 +13,7 @@ from flight.flown_row import FlownRow
 from flight.rig import FlightRig, check_card, make_card, take_log
 from flight.servos import LONGEST_GAP_MS, SERVOS, cuts_allowed, nobodys, spoiled, worst_gap_ms
 from flight.settings import reference_image
+from host.log import read_log  # here: each child of in_fork would load it anew
 from simavr_bench.card_journal import CardJournal
 
 # Bits that say who drives or what started the frame, not what may be used of it.
@@ -40,8 +41,6 @@ def run_fault(
 
     With the row of a card that is being flown, its input is judged too.
     """
-    import host
-
     begin = rig.chip.cycle
     fault.begin(rig)
     rig.chip.run_until(max(begin + round(fault.fault_s * 16e6), rig.chip.cycle))
@@ -56,7 +55,7 @@ def run_fault(
     rig.chip.power_off()
     image = rig.save_card(folder / "card.img")
     wrong += _judge_card(journal, image, begin)
-    log = host.read_log(take_log(image, folder / "flight.bin"))
+    log = read_log(take_log(image, folder / "flight.bin"))
     names = event_names()
     events = [
         Event(int(e["t_us"]), names.get(int(e["code"]), str(int(e["code"]))), int(e["arg"]))
