@@ -137,11 +137,13 @@ def driven_misfit(law: Identity) -> float | None:
     return DrivenTest(law).misfit() if testable(law) else None
 
 
-def driven_factors(law: Identity) -> Iterator[DrivenFactor]:
+def driven_test(law: Identity) -> DrivenTest | None:
+    """Return the test of an identity; None where no surface swings as a test input does."""
+    return DrivenTest(law) if law.driven and testable(law) else None
+
+
+def driven_factors(law: Identity, test: DrivenTest) -> Iterator[DrivenFactor]:
     """Return the factors that must be another than one, of those that explain the motion best."""
-    if not (law.driven and testable(law)):
-        return
-    test = DrivenTest(law)
     least = test.misfit()
     if least < chdtri(
         test.instruments, CERTAIN_P
@@ -158,17 +160,16 @@ def driven_factors(law: Identity) -> Iterator[DrivenFactor]:
     yield from (f for f in found if f.misfit - least < CERTAIN)
 
 
-def shared_factor(shares: Sequence[tuple[Identity, str]], tried: Iterable[float]) -> float | None:
+def shared_factor(tests: Sequence[tuple[DrivenTest, str]], tried: Iterable[float]) -> float | None:
     """Return the factor that parts of several identities must share; None where it may be one.
 
     Parameters
     ----------
-    shares : sequence of (Identity, str)
-        Identities, and the part of each that has the factor.
+    tests : sequence of (DrivenTest, str)
+        Of identities, and the part of each that has the factor.
     tried : iterable of float
         Factors that it may be.
     """
-    tests = [(DrivenTest(law), name) for law, name in shares if law.driven and testable(law)]
     whole = sum(test.misfit() for test, _ in tests)
     if whole < CERTAIN:
         return None
@@ -178,7 +179,7 @@ def shared_factor(shares: Sequence[tuple[Identity, str]], tried: Iterable[float]
 
 
 def likelier_factor(
-    shares: Sequence[tuple[Identity, str]],
+    tests: Sequence[tuple[DrivenTest, str]],
     tried: Collection[float],
     unlikely: Mapping[float, float],
 ) -> float | None:
@@ -188,12 +189,11 @@ def likelier_factor(
 
     Parameters
     ----------
-    shares, tried
+    tests, tried
         As `shared_factor`.
     unlikely : mapping
         How many deviations squared a factor is from what is usual; empty where nobody knows.
     """
-    tests = [(DrivenTest(law), name) for law, name in shares if law.driven and testable(law)]
     if not tests:
         return None
     broken = {

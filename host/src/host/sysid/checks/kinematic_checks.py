@@ -19,8 +19,10 @@ from host.readers.column_map import UNITS
 from host.sysid.checks.data_finding import AS_IT_IS, HINT, Finding
 from host.sysid.checks.driven_motion import (
     DrivenFactor,
+    DrivenTest,
     driven_factors,
     driven_misfit,
+    driven_test,
     likelier_factor,
     shared_factor,
 )
@@ -56,6 +58,8 @@ CHECK_OF = {
     ("altitude_m", "v_down_mps"): "altitude-against-climb",
 }
 UNIT = "another unit of one of them"
+_Tested = tuple[Identity, DrivenTest | None]
+_Share = tuple[Identity, DrivenTest | None, str]  # and the part of the identity
 SPEED_CAUSES = (
     "thrust that is not in ax_mps2", "wind that changes with height", "a slow pitot", UNIT,
 )  # fmt: skip
@@ -73,8 +77,8 @@ def consistent(flown: Mapping[str, Array], dt_s: float, *, weighed: bool = True)
         identity with them tells nothing more.
     """
     findings: list[Finding] = []
-    laws = list(identities(flown, dt_s))
-    for law in laws:
+    tested = [(law, driven_test(law) if weighed else None) for law in identities(flown, dt_s)]
+    for law, test in tested:
         if found := _unrelated(law):
             if law.opposed > -SIGN_CORRELATION:
                 findings.append(found)
@@ -82,9 +86,11 @@ def consistent(flown: Mapping[str, Array], dt_s: float, *, weighed: bool = True)
             # Gusts turn this wind angle, where no surface does: no rate says so.
         else:
             findings += [one for f in _without_gusts(law) if (one := _judge(f)) is not None]
-        findings += map(_judge_driven, driven_factors(law) if weighed else ())
+        findings += map(_judge_driven, driven_factors(law, test) if test else ())
     if weighed and not any(f.wrong_unit for f in findings):
-        findings += _judge_airspeed(laws) or _judge_units(laws, means_over(flown, dt_s, BLOCK_S))
+        findings += _judge_airspeed(tested) or _judge_units(
+            tested, means_over(flown, dt_s, BLOCK_S)
+        )
     return findings
 
 
@@ -185,39 +191,44 @@ def _judge_driven(f: DrivenFactor) -> Finding:
     )
 
 
-def _judge_airspeed(laws: Sequence[Identity]) -> list[Finding]:
+def _judge_airspeed(tested: Sequence[_Tested]) -> list[Finding]:
     """Return the finding of an airspeed whose unit only lift and side force together tell."""
-    parts = _over_airspeed(laws)
+    parts = _over_airspeed(tested)
     gains = [gain for gain in UNITS["mps"].values() if gain != 1.0]
-    times = shared_factor(parts, [*gains, *(1.0 / gain for gain in gains)])
+    times = shared_factor(_tests(parts), [*gains, *(1.0 / gain for gain in gains)])
     if times is None:
         return []
-    channels = dict.fromkeys(c for _, name in parts for c in reversed(_channels(name)))
+    channels = dict.fromkeys(c for _, _, name in parts for c in reversed(_channels(name)))
     text = f"airspeed_mps is about {times:.2g} times what forces make of it in what surfaces drive"
     causes = (f"{UNIT}: {HINT}", "scales of vanes or airspeed")
     return [Finding("alpha-against-az", (*channels,), text, causes, wrong_unit=True)]
 
 
-def _over_airspeed(laws: Sequence[Identity]) -> list[tuple[Identity, str]]:
-    return [(law, name) for law in laws for name in law.parts if name.endswith(OVER_AIRSPEED)]
+def _over_airspeed(tested: Sequence[_Tested]) -> list[_Share]:
+    found = [(law, test, name) for law, test in tested for name in law.parts]
+    return [share for share in found if share[2].endswith(OVER_AIRSPEED)]
 
 
-def _judge_units(laws: Sequence[Identity], means: Mapping[str, Array]) -> list[Finding]:
+def _tests(shares: Sequence[_Share]) -> list[tuple[DrivenTest, str]]:
+    return [(test, name) for _, test, name in shares if test]
+
+
+def _judge_units(tested: Sequence[_Tested], means: Mapping[str, Array]) -> list[Finding]:
     """Return the findings of an airspeed and a side force that another unit would suit better."""
     by_speed = {1.0 / gain: unit for unit, gain in UNITS["mps"].items() if gain != 1.0}
     # One in mg is proven; to read it so is to leave the side force out.
     by_force = {UNITS["mps2"][unit]: unit for unit in ("g", "ft/s2")}
-    sides = [(law, "ay_mps2") for law in laws if "ay_mps2" in law.terms]
+    sides = [(law, test, "ay_mps2") for law, test in tested if "ay_mps2" in law.terms]
     unlikely = unlikely_factors(means, (1.0, *by_force))
     return [
-        *_likelier_unit("airspeed_mps", _over_airspeed(laws), by_speed, {}),
+        *_likelier_unit("airspeed_mps", _over_airspeed(tested), by_speed, {}),
         *_likelier_unit("ay_mps2", sides, by_force, unlikely),
     ]
 
 
 def _likelier_unit(
     name: str,
-    shares: Sequence[tuple[Identity, str]],
+    shares: Sequence[_Share],
     units: Mapping[float, str],
     unlikely: Mapping[float, float],
 ) -> list[Finding]:
@@ -226,10 +237,10 @@ def _likelier_unit(
     Gusts may leave it open whether an airspeed is in m/s or in knots. That is no reading, but what
     the column scales is not to be trusted.
     """
-    likelier = likelier_factor(shares, units, unlikely)
+    likelier = likelier_factor(_tests(shares), units, unlikely)
     if likelier is None:
         return []
-    law, part = next((law, part) for law, part in shares if law.driven)
+    law, part = next((law, part) for law, _, part in shares if law.driven)
     check = CHECK_OF[law.name, part]
     text = f"{name} would agree better with what surfaces drive if it were in {units[likelier]}"
     causes = (f"its unit: {HINT}", "gusts", *(("an unusual side force",) if unlikely else ()))
