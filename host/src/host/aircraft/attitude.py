@@ -44,6 +44,18 @@ def euler_rates(
     )
 
 
+def body_rates(
+    phi: Column, theta: Column, phi_radps: Column, theta_radps: Column, psi_radps: Column
+) -> tuple[Column, Column, Column]:
+    """Return p, q, r (rad/s) of an attitude that turns: the inverse of `euler_rates`."""
+    level = psi_radps * np.cos(theta)
+    return (
+        phi_radps - psi_radps * np.sin(theta),
+        theta_radps * np.cos(phi) + level * np.sin(phi),
+        level * np.cos(phi) - theta_radps * np.sin(phi),
+    )
+
+
 def to_body(q: Array) -> Array:
     """Return matrices (..., 3, 3) that turn north-east-down vectors into body axes."""
     q0, q1, q2, q3 = (q[..., i] for i in range(4))

@@ -203,6 +203,21 @@ def test_injected_bias_scale_and_delay_come_back() -> None:
     assert 0.01 < moved("beta_scale") < 0.045
 
 
+def test_zeros_of_gyros_that_nobody_measured_are_found() -> None:
+    """A chip out of its box has 20 deg/s (MPU-6000 data sheet): a path turns by half a circle."""
+    columns, _ = flown(1)
+    before = recorded.reconstructed("survey", 1)
+    zeros = {"p_radps": -0.35, "q_radps": 0.3, "r_radps": 0.35}
+    after = reconstruct(
+        columns | {n: columns[n] + zero for n, zero in zeros.items()},
+        AIRFRAME,
+        INSTRUMENT.scaled(40.0, "gyro_bias_radps"),
+    )
+    for axis, zero in zip("xyz", zeros.values(), strict=True):
+        name = f"gyro_{axis}_bias_radps"
+        assert after[name].value - before[name].value == pytest.approx(zero, abs=2e-3), axis
+
+
 def test_gusts_do_not_pass_for_vanes_that_under_read() -> None:
     """The calibration's own word on the vanes is withheld: data alone tell their scale."""
     unsure = INSTRUMENT.scaled(10.0, "vane_scale")
@@ -239,6 +254,7 @@ def test_steps_to_and_fro_settle() -> None:
 
     problem = SimpleNamespace(
         prior_mean=np.zeros(1),
+        start=np.zeros(1),
         prior_precision=np.array([0.01]),
         model=SimpleNamespace(outputs=(HEIGHT,)),
         names=("height",),

@@ -7,7 +7,7 @@ no aerodynamics, so that vanes, pitot, barometer and GPS must agree with them fo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,6 +105,8 @@ class PathProblem:
         Standard deviations of the first guess of velocity, m/s, and attitude, rad.
     block : int
         Samples averaged to one.
+    start : mapping, optional
+        Where the search begins, of common unknowns that may be far from their mean.
     """
 
     def __init__(
@@ -114,6 +116,7 @@ class PathProblem:
         prior: dict[str, tuple[float, float]],
         start_sd: Array,
         block: int,
+        start: Mapping[str, float] | None = None,
     ) -> None:
         self.segments = tuple(segments)
         self.model = PathModel("flight path", outputs)
@@ -138,6 +141,9 @@ class PathProblem:
         own_sd = np.concatenate([start_sd, np.full(len(local) - len(START), np.inf)])
         count = len(self.segments)
         self.prior_mean = np.concatenate([mean, np.zeros(count * len(local))])
+        self.start = self.prior_mean.copy()
+        for name, value in (start or {}).items():
+            self.start[self._place[name]] = value
         self.prior_precision = np.concatenate([sd**-2.0, np.tile(own_sd**-2.0, count)])
         self.lower = np.full(len(names), -np.inf)
         self.upper = np.full(len(names), np.inf)

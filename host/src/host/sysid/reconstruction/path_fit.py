@@ -94,7 +94,7 @@ def fit_path(problem: PathProblem, lagged_inputs: Sequence[Array]) -> PathFit:
 
 def _search(problem: PathProblem, lagged_inputs: Sequence[Array], patience: int) -> PathFit:
     """Iterate to convergence, the first `patience` times with air data held to the prior."""
-    theta = problem.prior_mean.copy()
+    theta = problem.start.copy()
     noise = [ArNoise.white() for _ in problem.model.outputs]
     instruments: dict[int, list[Array]] = {}
     air = np.isin(problem.names, AIR_ERRORS)

@@ -36,7 +36,7 @@ from host.sysid.reconstruction.flight_path import (
     Segment,
 )
 from host.sysid.reconstruction.position_correction import transfer_to_cg
-from host.sysid.reconstruction.strapdown import rotation
+from host.sysid.reconstruction.strapdown import rotation, zeros_by_attitude
 
 # Above this rate a vane slides; noise of its rate after the low-pass is about 0.015 rad/s.
 SLIDING_RADPS = 0.02
@@ -105,7 +105,8 @@ def prepare_path_problem(
     start_sd = START_SD if gps else np.where(np.arange(len(START)) == 5, 1e-6, START_SD)
     priors = prior(instrument or usual, vanes=vanes)
     priors = {k: v for k, v in priors.items() if gps or k in WITHOUT_GPS}
-    problem = PathProblem(segments, outputs, priors, start_sd, block)
+    zeros = zip(INERTIAL[0:3], zeros_by_attitude(data, cuts, dt_s), strict=False)
+    problem = PathProblem(segments, outputs, priors, start_sd, block, dict(zeros))
     t = data["t_s"]
     when = tuple((float(t[c.start]), float(t[c.stop - 1])) for c in cuts)
     return problem, [_lagged_inputs(columns, cut, block) for cut in cuts], when

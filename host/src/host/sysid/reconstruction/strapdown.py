@@ -2,10 +2,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
+from host.aircraft.attitude import body_rates
 from host.arrays import Array, IntArray
 from host.constants import GRAVITY_MPS2
+
+ATTITUDE = ("phi_rad", "theta_rad", "psi_rad")
+GYROS = ("p_radps", "q_radps", "r_radps")
+
+
+def zeros_by_attitude(
+    columns: Mapping[str, Array], cuts: Sequence[slice], dt_s: float
+) -> list[float]:
+    """Return by how much gyros turn faster than the attitude, rad/s; nothing without attitude.
+
+    Where a path is integrated from zeros of 20 deg/s (MPU-6000 data sheet), no search converges.
+
+    Parameters
+    ----------
+    columns : mapping of (n,) Array
+    cuts : sequence of slice
+        Samples that count.
+    dt_s : float
+    """
+    if not all(name in columns for name in ATTITUDE):
+        return []
+    phi, theta, psi = (np.unwrap(columns[name]) for name in ATTITUDE)
+    turned = body_rates(phi, theta, *(np.gradient(x, dt_s) for x in (phi, theta, psi)))
+    inside = np.concatenate([np.arange(c.start, c.stop) for c in cuts])
+    return [
+        float(np.mean((columns[name] - own)[inside]))
+        for name, own in zip(GYROS, turned, strict=True)
+    ]
 
 
 def strapdown(
