@@ -1,6 +1,7 @@
 #include "core/imu/attitude.h"
 
 #include "core/imu/fixed_point.h"
+#include "core/imu/rest_detector.h"
 
 namespace core {
 namespace {
@@ -15,7 +16,7 @@ constexpr int32_t kPermilleQ28 = 268435;            // 0.001
 constexpr int32_t kPpmQ28 = 268;                    // 1e-6
 constexpr int32_t kFastGainQ28 = INT32_C(3) << 28;  // 3 1/s while settling
 constexpr int32_t kRecoverGainQ28 = INT32_C(1) << 27;
-constexpr int32_t kBiasLimitQ30 = 93689000;  // 5 deg/s
+constexpr int32_t kLearnedLimitQ30 = 93689000;  // 5 deg/s, from what the first rest said
 constexpr uint16_t kFullWeight = 4096;
 constexpr uint32_t kShortestUs = 1000;
 constexpr uint32_t kLongestUs = 40000;
@@ -108,16 +109,21 @@ Attitude::Vector Attitude::gravity_error(uint16_t& weight) const {
 void Attitude::learn(const Vector& error_q25, int32_t gain_q28, int32_t dt_k) {
   // Q25 rad * Q28 1/s2 * s as Q30 rad/s; dt_k is 4 * dt in Q32.
   const int32_t per_step = mul_high(gain_q28, dt_k) * 128;
-  bias_[0] = clamp(bias_[0] - mul_high(error_q25.x, per_step), kBiasLimitQ30);
-  bias_[1] = clamp(bias_[1] - mul_high(error_q25.y, per_step), kBiasLimitQ30);
-  bias_[2] = clamp(bias_[2] - mul_high(error_q25.z, per_step), kBiasLimitQ30);
+  const int32_t error[3] = {error_q25.x, error_q25.y, error_q25.z};
+  for (uint8_t axis = 0; axis < 3; ++axis) {
+    const int32_t learned = bias_[axis] - rest_bias_[axis] - mul_high(error[axis], per_step);
+    bias_[axis] = rest_bias_[axis] + clamp(learned, kLearnedLimitQ30);
+  }
 }
 
 void Attitude::set_rest_rates(const int16_t (&rates)[3]) {
-  constexpr int32_t kMost = kBiasLimitQ30 / 8 / kRadpsQ27;
   for (uint8_t axis = 0; axis < 3; ++axis) {
-    bias_[axis] = clamp(rates[axis], kMost) * kRadpsQ27 * 8;
+    const int32_t seen = clamp(rates[axis], RestDetector::kMostRate) * kRadpsQ27 * 8;
+    // A later one may be a turn without a gust.
+    rest_bias_[axis] = rested_ ? rest_bias_[axis] : seen;
+    bias_[axis] = rest_bias_[axis] + clamp(seen - rest_bias_[axis], kLearnedLimitQ30);
   }
+  rested_ = true;
 }
 
 void Attitude::step(const AttitudeInput& in, uint32_t dt_us) {
@@ -251,7 +257,10 @@ void Attitude::set_field(const int16_t (&field)[3]) {
 }
 
 void Attitude::forget_bias() {
-  bias_[0] = bias_[1] = bias_[2] = 0;
+  for (uint8_t axis = 0; axis < 3; ++axis) {
+    bias_[axis] = rest_bias_[axis] = 0;
+  }
+  rested_ = false;
 }
 
 int16_t Attitude::bias(uint8_t axis) const {

@@ -81,6 +81,7 @@ class Attitude {
   Vector correction_ = {};                  // Q27 rad/s, held between two corrections
   Vector last_rate_ = {};                   // Q27 rad/s
   int32_t bias_[3] = {};                    // Q30 rad/s
+  int32_t rest_bias_[3] = {};               // as the first rest said
   int32_t heading_error_ = 0;               // Q25 rad, positive: heading too large
   int32_t force_sum_[3] = {};
   uint32_t passed_us_ = 0;
@@ -97,6 +98,7 @@ class Attitude {
   bool accel_saturated_ = false;
   bool started_ = false;
   bool at_rest_ = false;
+  bool rested_ = false;
 };
 
 }  // namespace core

@@ -167,6 +167,26 @@ TEST_CASE("a gyro bias is learned in flight, and within seconds at rest") {
   CHECK_EQ(filter.attitude.bias(0), 0);
 }
 
+TEST_CASE("the first rest says all of a chip's offset, flight and later ones 5 deg/s more of it") {
+  Filter filter;
+  filter.run(Attitude::kSettleSteps);
+  const int16_t means[3] = {1310, -1310, 1638};  // 20 deg/s, and all that counts as rest
+  for (uint8_t axis = 0; axis < 3; ++axis) filter.in.rates[axis] = means[axis];
+  filter.attitude.set_rest_rates(means);
+  filter.run(12000);
+  CHECK(off(filter.attitude.phi_cdeg(), 0) <= 10);
+  CHECK(off(filter.attitude.theta_cdeg(), 0) <= 10);
+  for (uint8_t axis = 0; axis < 3; ++axis) CHECK(off(filter.attitude.bias(axis), means[axis]) <= 1);
+  filter.in.force[1] = -4096;  // seen at a bank that it never takes, for four minutes
+  filter.run(48000);
+  CHECK(off(filter.attitude.bias(0), means[0]) <= 328);
+  const int16_t turn[3] = {1310, -1310, 0};
+  filter.attitude.set_rest_rates(turn);
+  CHECK(off(filter.attitude.bias(2), 1638 - 327) <= 1);
+  filter.attitude.forget_bias();
+  for (uint8_t axis = 0; axis < 3; ++axis) CHECK_EQ(filter.attitude.bias(axis), 0);
+}
+
 TEST_CASE("a coordinated turn at 60 deg does not pull it level when the speed is known") {
   // 18 m/s at 60 deg: g tan(60) / V = 0.9436 rad/s; q = r' sin, r = r' cos; f = (0, 0, -2 g).
   for (uint8_t known = 0; known < 2; ++known) {

@@ -16,7 +16,8 @@ using core::AttitudeSettings;
 constexpr double kRadPerDeg = 3.14159265358979 / 180.0;
 constexpr double kRadpsPerLsb = kRadPerDeg / 65.5;
 constexpr double kLsbPerG = 8192.0;
-constexpr double kMostBias_radps = 5.0 * kRadPerDeg;
+constexpr double kMostBias_radps = 5.0 * kRadPerDeg;  // from the rest's
+constexpr double kMostRest_radps = 1638 / 65.5 * kRadPerDeg;
 
 double within(double value, double most) {
   return fmax(-most, fmin(most, value));
@@ -46,7 +47,7 @@ struct Equations {
   const AttitudeSettings& settings;
   double w = 1.0;
   Three v;
-  Three correction, last_rate, bias, force_sum;
+  Three correction, last_rate, bias, rest_bias, force_sum;
   double heading_error = 0.0;
   double passed_s = 0.0, speed_left_s = 0.0, field_left_s = 0.0;
   double speed_mps = 0.0;
@@ -54,7 +55,7 @@ struct Equations {
   int settle = Attitude::kSettleSteps, recover = Attitude::kSettleSteps;
   int samples = 0;
   double turning = 0.0;  // LSB
-  bool saturated = false, started = false, at_rest = false;
+  bool saturated = false, started = false, at_rest = false, rested = false;
 
   static void turn(double& w, Three& v, const Three& half) {
     const double w0 = w;
@@ -146,8 +147,8 @@ struct Equations {
     }
     if (settle == 0 && recover == 0 && !at_rest) {
       const double learned = 1e-6 * settings.bias_gain_ppm * fmin(passed_s, 0.1);
-      bias = limited(bias + error * (-learned * weight), kMostBias_radps);
-      bias = limited(bias + heading * -learned, kMostBias_radps);
+      bias = near_rest(bias + error * (-learned * weight));
+      bias = near_rest(bias + heading * -learned);
     }
     correction = limited(error, 1.0) * (gain * weight) + limited(heading, 1.0) * heading_gain;
   }
@@ -168,8 +169,14 @@ struct Equations {
     field_left_s = 0.5;
   }
   void set_rest_rates(const int16_t (&rates)[3]) {
-    bias = limited(Three{double(rates[0]), double(rates[1]), double(rates[2])} * kRadpsPerLsb,
-                   kMostBias_radps);
+    const Three seen = {double(rates[0]), double(rates[1]), double(rates[2])};
+    const Three rest = limited(seen * kRadpsPerLsb, kMostRest_radps);
+    if (!rested) rest_bias = rest;
+    rested = true;
+    bias = near_rest(rest);
+  }
+  Three near_rest(const Three& learned) const {
+    return rest_bias + limited(learned + rest_bias * -1.0, kMostBias_radps);
   }
 };
 
