@@ -274,8 +274,8 @@ def test_angles_are_carried_on_by_the_delay_of_their_rates() -> None:
     def late(carry_s: float) -> float:
         angles, kept = np.zeros_like(rates), np.zeros((3, 3))
         complementary(
-            rates, force, still, still, step_s, carry_s, 0, len(t), turned_to(start), kept, angles,
-            np.zeros_like(rates),
+            rates, force, still, still, step_s, carry_s, 0, len(t), 0, turned_to(start), kept,
+            angles, np.zeros_like(rates),
         )  # fmt: skip
         true = size * np.sin(w * t)
         return left_over_s(t, true[:, None], t, angles[:, 0], 0)

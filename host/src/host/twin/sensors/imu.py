@@ -96,6 +96,7 @@ def complementary(
     carry_s: float,
     first: int,
     last: int,
+    resting: int,
     c: Array,
     kept: Array,
     angles: Array,
@@ -107,10 +108,16 @@ def complementary(
     `rates` (m, 3) rad/s, `force` (m, 3) m/s2, `heading` (m,) rad from the magnetometer, `speed`
     (m,) m/s for the centripetal correction. `c` (3, 3), body to north-east-down, and `kept` (3, 3),
     bias, correction and rate of the sample before, are what it remembers. As in the IMU's firmware
-    the angles are carried on by the nominal delay `carry_s` of the gyro.
+    the angles are carried on by the nominal delay `carry_s` of the gyro; and in the first `resting`
+    samples, from the third second on, the mean rates of the second before the last are the bias,
+    and nothing else teaches it.
     """
     bias, e, before = kept[0], kept[1], kept[2]
+    second = int(1.0 / step_s + 0.5)
     for i in range(first, last):
+        if 3 * second <= i < resting and i % second == 0:
+            for k in range(3):
+                bias[k] = np.mean(rates[i - 2 * second : i - second, k])
         now = rates[i] - bias
         if i > 0:
             w = (0.5 * (before + now) + e) * step_s
@@ -137,7 +144,8 @@ def complementary(
         off = math.sin(heading[i] - angles[i, 2]) * HEADING_GAIN_PERS
         for k in range(3):
             e[k] += off * c[2, k]
-            bias[k] -= BIAS_GAIN_PERS2 / TILT_GAIN_PERS * e[k] * step_s
+            if i >= resting:
+                bias[k] -= BIAS_GAIN_PERS2 / TILT_GAIN_PERS * e[k] * step_s
 
 
 @compiled_fast
@@ -234,6 +242,7 @@ class ImuSampling:
     ) -> None:
         n, m = len(record.t_s), len(at_s)
         self._record, self._switches, draws = record, record.card.sensors, record.draws
+        self._resting = int(np.searchsorted(at_s, record.card.flight.ground_s))
         self._place = np.zeros(3)
         if self._switches.position:
             self._place = (
@@ -288,7 +297,7 @@ class ImuSampling:
                 self._c[:] = turned_to(angles[0])
             complementary(
                 self._exact[0], self._exact[1], self._heading, self._speed, self._step_s,
-                self._carry_s, first, last,
+                self._carry_s, first, last, self._resting,
                 self._c, self._kept, out.attitude_rad, out.bias_radps,
             )  # fmt: skip
         else:
