@@ -272,7 +272,7 @@ def test_angles_are_carried_on_by_the_delay_of_their_rates() -> None:
     start = np.array([angle[0], 0.0, 0.0])
 
     def late(carry_s: float) -> float:
-        angles, kept = np.zeros_like(rates), np.zeros((3, 3))
+        angles, kept = np.zeros_like(rates), np.zeros((4, 3))
         complementary(
             rates, force, still, still, step_s, carry_s, 0, len(t), 0, turned_to(start), kept,
             angles, np.zeros_like(rates),

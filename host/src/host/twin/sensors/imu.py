@@ -26,6 +26,7 @@ ANGLE_LSB_RAD = math.radians(0.01)
 TILT_GAIN_PERS = 0.2
 HEADING_GAIN_PERS = 0.3
 BIAS_GAIN_PERS2 = 0.005
+REST_SPREAD_RADPS = math.radians(2.0)  # from end to end of a second: the firmware's RestDetector
 SPEED_LATE_S = 0.3  # of a GPS
 FIELD_NED_T = np.array([30.0e-6, 2.2e-6, 32.0e-6])  # near Cairo, declination 4.1 deg (thesis)
 
@@ -106,18 +107,25 @@ def complementary(
     (m, 3), the bias estimate into `biases` (m, 3).
 
     `rates` (m, 3) rad/s, `force` (m, 3) m/s2, `heading` (m,) rad from the magnetometer, `speed`
-    (m,) m/s for the centripetal correction. `c` (3, 3), body to north-east-down, and `kept` (3, 3),
-    bias, correction and rate of the sample before, are what it remembers. As in the IMU's firmware
-    the angles are carried on by the nominal delay `carry_s` of the gyro; and in the first `resting`
-    samples, from the third second on, the mean rates of the second before the last are the bias,
-    and nothing else teaches it.
+    (m,) m/s for the centripetal correction. `c` (3, 3), body to north-east-down, and `kept` (4, 3),
+    bias, correction and rate of the sample before, and rest, are what it remembers. As in the IMU's
+    firmware the angles are carried on by the nominal delay `carry_s` of the gyro; and behind three
+    seconds at rest, which are among the first `resting` samples, the mean rates of the second
+    before the last are the bias, and nothing else teaches it.
     """
     bias, e, before = kept[0], kept[1], kept[2]
     second = int(1.0 / step_s + 0.5)
+    at_rest = kept[3, 0] > 0.0
     for i in range(first, last):
-        if 3 * second <= i < resting and i % second == 0:
+        if i % second == 0:
+            at_rest = 3 * second <= i < resting
             for k in range(3):
-                bias[k] = np.mean(rates[i - 2 * second : i - second, k])
+                if at_rest:
+                    seen = rates[i - 3 * second : i, k]
+                    at_rest = seen.max() - seen.min() < REST_SPREAD_RADPS
+            for k in range(3):
+                if at_rest:
+                    bias[k] = np.mean(rates[i - 2 * second : i - second, k])
         now = rates[i] - bias
         if i > 0:
             w = (0.5 * (before + now) + e) * step_s
@@ -144,8 +152,9 @@ def complementary(
         off = math.sin(heading[i] - angles[i, 2]) * HEADING_GAIN_PERS
         for k in range(3):
             e[k] += off * c[2, k]
-            if i >= resting:
+            if not at_rest:
                 bias[k] -= BIAS_GAIN_PERS2 / TILT_GAIN_PERS * e[k] * step_s
+    kept[3, 0] = 1.0 if at_rest else 0.0
 
 
 @compiled_fast
@@ -261,7 +270,7 @@ class ImuSampling:
         self._field_noise = rng.standard_normal((m, 3)) * (2e-7 if self._switches.noise else 0.0)
         self._step_s = float(np.median(np.diff(at_s))) if m > 1 else STEP_S
         self._carry_s = FILTERS[dlpf][0][1] if self._switches.imu_filter else 0.0
-        self._c, self._kept = np.zeros((3, 3)), np.zeros((3, 3))
+        self._c, self._kept = np.zeros((3, 3)), np.zeros((4, 3))
         self._heading, self._speed = np.zeros(m), np.zeros(m)
         # Of every step: as sensed, behind the low-pass, true angles unwrapped, ground speed.
         self._sensed = [np.zeros((n, 3)), np.zeros((n, 3))]
