@@ -179,11 +179,17 @@ class SdCard:
         return self._memory[number * BLOCK : (number + count) * BLOCK]
 
     def changed_pages(self) -> NDArray[np.bool_]:
-        """Tell which pages of a card with `in_place` false are no longer those of its image."""
+        """Tell which pages of a card with `in_place` false are no longer those of its image.
+
+        All of them, where the system does not tell.
+        """
         words = -(-len(self._memory) // mmap.PAGESIZE)
-        with Path("/proc/self/pagemap").open("rb") as pages:
-            pages.seek(8 * (ct.addressof(self._buffer) // mmap.PAGESIZE))
-            entries = np.frombuffer(pages.read(8 * words), "<u8")
+        try:
+            with Path("/proc/self/pagemap").open("rb") as pages:
+                pages.seek(8 * (ct.addressof(self._buffer) // mmap.PAGESIZE))
+                entries = np.frombuffer(pages.read(8 * words), "<u8")
+        except OSError:
+            return np.ones(words, dtype=np.bool_)
         # proc(5): 63 in memory, 62 swapped out, 61 of a file.
         return np.asarray((entries >> 62 != 0) & (entries >> 61 & 1 == 0))
 
