@@ -284,6 +284,24 @@ def test_angles_are_carried_on_by_the_delay_of_their_rates() -> None:
     assert late(0.0) == pytest.approx(late_s, abs=5e-5)
 
 
+@pytest.mark.parametrize("still", [True, False])
+def test_the_attitude_filter_learns_the_zeros_of_the_gyros_at_rest(*, still: bool) -> None:
+    """Of 20 deg/s it turns for ever (MPU-6000 data sheet); a moving hand is no rest."""
+    step_s, resting = 0.005, 1000
+    zero = np.radians([20.0, -20.0, 10.0])
+    rates = np.tile(zero, (4000, 1))
+    rates[:resting, 0] += 0.0 if still else 0.1 * np.sin(0.01 * np.arange(resting))
+    force = np.tile([0.0, 0.0, -GRAVITY_MPS2], (len(rates), 1))
+    level, angles, biases = np.zeros(len(rates)), np.zeros_like(rates), np.zeros_like(rates)
+    complementary(
+        rates, force, level, level, step_s, 0.0, 0, len(rates), resting, np.eye(3),
+        np.zeros((4, 3)), angles, biases,
+    )  # fmt: skip
+    assert np.allclose(biases[resting - 1], zero, atol=1e-6) is still
+    tilt_rad = np.abs(angles[-2000:, :2]).max()
+    assert tilt_rad < np.radians(20.0) if still else tilt_rad > 1.0
+
+
 def test_a_pole_and_a_vane_lag_behind_a_steady_turn_by_what_they_are_given() -> None:
     t = np.arange(0.0, 3.0, STEP_S)
     ramp = 0.1 * t

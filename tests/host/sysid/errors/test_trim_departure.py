@@ -30,6 +30,8 @@ from host.twin.virtual import virtual_flight
 from studies.foreign.flight import derivatives as foreign_derivatives
 from studies.foreign.flight import fly as fly_foreign
 from studies.independent import cells
+from studies.judgement.judged_rows import judged_rows
+from studies.judgement.trainer_flights import perfect_sensors
 from studies.linear import derivatives
 
 import host
@@ -246,3 +248,12 @@ def test_a_linear_record_has_no_departures() -> None:
     assert answer.coherence is not None and not answer.coherence.suspected
     k = answer.result.index("L_p")
     assert answer.result.half_width()[k] < 0.007 * abs(answer.result.estimate[k])
+
+
+def test_drag_follows_the_lift_of_pitching_too() -> None:
+    """Where the polar has all lift D_de was high by two half-widths, D_alpha by one."""
+    names = ("D_alpha", "D_de")
+    for row in judged_rows("perfect sensors, known", 18, perfect_sensors(18), names):
+        if row["name"] in names:
+            estimate, true, half = (float(str(row[k])) for k in ("estimate", "true", "half_width"))
+            assert abs(estimate - true) < 0.85 * half

@@ -10,9 +10,6 @@ from host.aircraft.attitude import body_rates
 from host.arrays import Array, IntArray
 from host.constants import GRAVITY_MPS2
 
-ATTITUDE = ("phi_rad", "theta_rad", "psi_rad")
-GYROS = ("p_radps", "q_radps", "r_radps")
-
 
 def zeros_by_attitude(
     columns: Mapping[str, Array], cuts: Sequence[slice], dt_s: float
@@ -28,14 +25,15 @@ def zeros_by_attitude(
         Samples that count.
     dt_s : float
     """
-    if not all(name in columns for name in ATTITUDE):
+    attitude = ("phi_rad", "theta_rad", "psi_rad")
+    if not all(name in columns for name in attitude):
         return []
-    phi, theta, psi = (np.unwrap(columns[name]) for name in ATTITUDE)
+    phi, theta, psi = (np.unwrap(columns[name]) for name in attitude)
     turned = body_rates(phi, theta, *(np.gradient(x, dt_s) for x in (phi, theta, psi)))
     inside = np.concatenate([np.arange(c.start, c.stop) for c in cuts])
     return [
-        float(np.mean((columns[name] - own)[inside]))
-        for name, own in zip(GYROS, turned, strict=True)
+        float(np.mean((columns[f"{axis}_radps"] - own)[inside]))
+        for axis, own in zip("pqr", turned, strict=True)
     ]
 
 
