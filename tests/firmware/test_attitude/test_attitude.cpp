@@ -167,19 +167,16 @@ TEST_CASE("a gyro bias is learned in flight, and within seconds at rest") {
   CHECK_EQ(filter.attitude.bias(0), 0);
 }
 
-TEST_CASE("the first rest says all of a chip's offset, flight and later ones 5 deg/s more of it") {
+TEST_CASE("the first rest says all of a chip's offset, later ones 5 deg/s more of it") {
   Filter filter;
   filter.run(Attitude::kSettleSteps);
   const int16_t means[3] = {1310, -1310, 1638};  // 20 deg/s, and all that counts as rest
   for (uint8_t axis = 0; axis < 3; ++axis) filter.in.rates[axis] = means[axis];
   filter.attitude.set_rest_rates(means);
-  filter.run(12000);
+  filter.run(2000);
   CHECK(off(filter.attitude.phi_cdeg(), 0) <= 10);
   CHECK(off(filter.attitude.theta_cdeg(), 0) <= 10);
   for (uint8_t axis = 0; axis < 3; ++axis) CHECK(off(filter.attitude.bias(axis), means[axis]) <= 1);
-  filter.in.force[1] = -4096;  // seen at a bank that it never takes, for four minutes
-  filter.run(48000);
-  CHECK(off(filter.attitude.bias(0), means[0]) <= 328);
   const int16_t turn[3] = {1310, -1310, 0};
   filter.attitude.set_rest_rates(turn);
   CHECK(off(filter.attitude.bias(2), 1638 - 327) <= 1);
