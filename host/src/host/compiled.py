@@ -42,8 +42,8 @@ class Kernel(Generic[Arguments, Result]):
     Parameters
     ----------
     function : callable
-        Of scalars and arrays; raises nothing of its own. It names the kernels that it calls, not a
-        module and a kernel in it.
+        Function of scalars and arrays; it raises nothing of its own. It names the kernels that it
+        calls, not a module and a kernel in it.
     reordered : bool
         Let the compiler reorder sums.
     part : bool
@@ -105,7 +105,7 @@ class Kernel(Generic[Arguments, Result]):
         Parameters
         ----------
         work : float
-            Of the call to come, in the caller's own unit.
+            Work of the call to come, in the caller's own unit.
         worth : float
             Work from which on machine code pays.
         """
@@ -210,7 +210,7 @@ def generated_source(text: str, kind: str) -> Path:
     Returns
     -------
     Path
-        Of a file, or of none where nobody may write: it is then compiled in every process.
+        Path of a file, or of none where nobody may write: it is then compiled in every process.
     """
     stem = f"{kind}_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
     by_source = Path(__file__).parent / "__pycache__" / KEPT

@@ -25,6 +25,6 @@ STEEPEST_SINE = 0.5  # of a path; a steeper one is an error of the velocity down
 # 95 % half-width over an estimate, or over what would contribute 5 % of its row: up to the first it
 # is trusted, up to the second used with care. Everything that judges a width reads these two.
 TRUST_SHARE, CARE_SHARE = 0.10, 0.30
-# Of the largest contribution to an equation: a smaller parameter is measured against what would
+# Share of an equation's largest contribution: a smaller parameter is measured against what would
 # contribute as much.
 SMALL_SHARE = 0.05

@@ -66,7 +66,7 @@ def plugged_in(group: str) -> dict[str, Plug]:
     Parameters
     ----------
     group : str
-        Of entry points, ``host.identification_methods``.
+        Group of entry points, ``host.identification_methods``.
     """
     return dict(_read(group, tuple(sys.path)))
 

@@ -54,7 +54,7 @@ def from_dimensions(
     document : mapping
         As `dimensions/kadetlt40.toml`; `name`, `title`, `published` may be left out.
     source : str or Path
-        Of messages.
+        Name of the file in messages.
     error : type
         What to raise.
 

@@ -21,7 +21,7 @@ from host.errors import UsageError
 from host.files import toml_reader
 
 FOLDER = Path(__file__).parent / "airframes"
-# Of a trainer, to be copied: the handbook makes an aircraft of sizes.
+# Sizes of a trainer, to be copied: the handbook makes an aircraft of them.
 SIZES = FOLDER.with_name("dimensions") / "kadetlt40.toml"
 
 _SCALARS: Mapping[str, tuple[str, ...]] = {
@@ -236,8 +236,8 @@ def load_measured(source: str | Path) -> Aircraft:
     Returns
     -------
     Aircraft
-        Of a measured file aerodynamics and surfaces are zeros, servo too without a section of that
-        name, and without a section propulsion there is none.
+        Aerodynamics and surfaces of a measured file are zeros. It has a servo or propulsion only
+        where it has a section of that name.
 
     Raises
     ------

@@ -48,7 +48,7 @@ class FlownCondition:
     surfaces_rad : tuple of float
         Elevator, aileron, rudder.
     climb_rad : float
-        Of the path through the air.
+        Angle of the path through the air.
     """
 
     airspeed_mps: float

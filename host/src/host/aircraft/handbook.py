@@ -76,7 +76,7 @@ def downwash_slope(aspect_ratio: float, arm_spans: float, height_spans: float) -
     Parameters
     ----------
     aspect_ratio : float
-        Of the wing.
+        Aspect ratio of the wing.
     arm_spans, height_spans : float
         Place of the tail behind and above the wing, in spans.
     """

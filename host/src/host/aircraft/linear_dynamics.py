@@ -24,7 +24,7 @@ class LinearDynamics:
     Attributes
     ----------
     u_mps, w_mps : float
-        Of the steady flight.
+        Velocity in steady flight, body axes.
     elevator_rad, throttle : float
         There.
     longitudinal_a, longitudinal_b : (4, 4), (4, 2) arrays

@@ -14,7 +14,7 @@ _OPEN = re.compile(r"^(?P<key>\w+) = \?(?P<optional>-?)\s*# (?P<question>.*)$")
 _COMPUTED = re.compile(r" \[.*\]$")
 _TEXTS = ("name", "title", "source")
 _NUMBERS = 3  # of a place
-# Of a key that may stay out, what stays out with it.
+# What stays out together with a key that may stay out.
 _WITH = {"ground_pitch_rad": ("ground_pitch_tolerance_rad",)}
 
 

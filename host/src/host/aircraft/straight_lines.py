@@ -20,7 +20,7 @@ def straight_coefficients(
     ----------
     aircraft : Aircraft
     alpha_rad : float
-        Of the trim.
+        Angle of attack at trim.
     identified : sequence of str
         For the head: what was identified, with its interval.
     """

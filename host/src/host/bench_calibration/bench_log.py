@@ -111,7 +111,7 @@ class LogSource:
     subject : Subject
     channel : str
     positions : sequence of float
-        Of one round, in the tool's setting.
+        Positions of one round, in the tool's setting.
     first_repeat : int
     """
 

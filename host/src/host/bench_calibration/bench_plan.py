@@ -67,7 +67,7 @@ class Subject:
         Section of the calibration file: channel, pulse, imu; empty if the result is stored
         elsewhere.
     positions : tuple
-        Of one repeat, in the tool's setting; of the IMU, words.
+        Positions of one repeat, in the tool's setting; words for the IMU.
     limits : mapping of str to (float or (float, float))
         In raw units.
     signed : bool

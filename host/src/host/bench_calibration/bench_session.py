@@ -47,11 +47,11 @@ class Bench:
         Tables, logs, captured radio, the logger's port; ``-``: typed. A further source is a
         further repeat.
     positions : tuple of float
-        Of one round; empty: those of the subject.
+        Positions of one round; empty: those of the subject.
     into, picture : Path or None
         None: named by instrument and date; in the file's folder.
     turn_deg : float
-        Of the gyros' turntable, in a recording.
+        Turn of the gyros' turntable, in a recording.
     """
 
     subject: Subject

@@ -43,11 +43,11 @@ class LineFit:
     repeat_zeros : (repeats,) array
         Zero of each repeat, raw unit.
     repeat_zero_sigma : float
-        Of one of them as the tool's file has it, raw unit.
+        Standard deviation of one of them as the tool's file has it, raw unit.
     value, raw, residuals : (n,) array
     repeat, direction : (n,) array of int
     fitted : (n,) array
-        Of the line or curve, without a repeat's placing and without hysteresis, raw unit.
+        Readings by the line or curve, without a repeat's placing and without hysteresis, raw unit.
     curve : tuple of float
         As in `host.physical.calibration.Line`; empty: a line.
     scatter : float

@@ -22,7 +22,7 @@ class TypedSource:
     subject : Subject
     channel : str
     positions : sequence of float
-        Of one repeat.
+        Positions of one repeat.
     ask : callable
         Takes a question, returns the typed line; empty at the end of the input.
     say : callable

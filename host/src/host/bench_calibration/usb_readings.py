@@ -31,7 +31,7 @@ class UsbSource(TypedSource):
     Parameters
     ----------
     channels : UsbChannels
-        Of the open port.
+        Channels of the open port.
     subject, channel, positions, ask, say
         As `TypedSource` has them.
     first_repeat : int

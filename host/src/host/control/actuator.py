@@ -27,7 +27,7 @@ class Actuator:
     travel_rad : float
         Angle at full output; `travel_share` is one standard deviation of it.
     bandwidth_hz : float
-        Of the servo as a first-order lag; `bandwidth_share` the same.
+        Bandwidth of the servo as a first-order lag; `bandwidth_share` the same.
     rate_limit_radps : float
     delay_s : float
         Between the output's calculation and the servo, mean; `delay_sd_s` the same.

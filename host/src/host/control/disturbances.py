@@ -27,7 +27,7 @@ def gust_inputs(
     ----------
     axis : str
     a : Array, shape (n, n)
-        Of the aircraft alone.
+        System matrix of the aircraft alone.
     states : sequence of str
     airspeed_mps, span_m : float
     w : Array, shape (F,)

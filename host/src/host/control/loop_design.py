@@ -28,7 +28,7 @@ class Design:
     gains : dict of str to float, or None
         By their role; None where none hold.
     verification : Verification
-        Of these gains, or of the softest where none hold.
+        Verification of these gains, or of the softest where none hold.
     rounds : int
         Designs until one held on aircraft that none had seen.
     """
@@ -47,9 +47,9 @@ def design(problem: Problem, *, seed: int = 0, asked: Required | None = None) ->
     ----------
     problem : Problem
     seed : int
-        Of the aircraft drawn.
+        Seed of the aircraft drawn.
     asked : Required, optional
-        Of the first design, where that is more than what is required.
+        Margins of the first design, where they are more than what is required.
     """
     required = Required()
     asked = asked or required

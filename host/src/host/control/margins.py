@@ -17,7 +17,7 @@ FAR_DEG = 180.0
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """Of loops, each array of shape (N,).
+    """Margins of loops, each array of shape (N,).
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class Margins:
         Smallest change of gain, up or down, that reaches -1.
     phase_deg : Array
     disk : Array
-        Of balanced sensitivity (Seiler, Packard & Gahinet 2020).
+        Disk margin of balanced sensitivity (Seiler, Packard & Gahinet 2020).
     crossover_radps : Array
         Highest frequency of unit gain; 0 where there is none.
     """
@@ -44,7 +44,7 @@ def margins(response: Spectra, frequency_radps: Array) -> Margins:
     Parameters
     ----------
     response : Array, shape (N, F)
-        Of each loop L, negative feedback: the critical point is -1.
+        Response of each loop L, negative feedback: the critical point is -1.
     frequency_radps : Array, shape (F,)
     """
     size = np.log(np.maximum(np.abs(response), 1e-300))

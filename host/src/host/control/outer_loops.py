@@ -35,7 +35,7 @@ class OuterLoop:
     ----------
     title : str
     axis : str
-        Of the attitude that it asks for.
+        Axis of the attitude that it asks for.
     parameters : mapping of str to float
         By name, with defaults where the log has none.
     loop : callable
@@ -77,7 +77,7 @@ def check(outer: OuterLoop, problem: Problem, gains: Mapping[str, float], seed: 
     ----------
     outer : OuterLoop
     problem : Problem
-        Of the attitude it asks for.
+        Problem of the attitude that it asks for.
     gains : mapping of str to float
         Tuned, by role.
     seed : int
@@ -105,7 +105,7 @@ def encircles_nothing(loop: Spectra, w: Array) -> Array:
     """
     s = 1j * w
     turned = np.unwrap(np.angle((1.0 + loop) * (s / (s + 1.0)) ** 3), axis=-1)
-    # Of a stable one the angle starts at the quarter turns that its integrators left of the three,
+    # The angle of a stable loop starts at the quarter turns that its integrators left of the three,
     # and unwinds to none at high frequency.
     slope = np.log(np.abs(loop[:, 1] / loop[:, 0])) / np.log(w[1] / w[0])
     left = 3.0 + np.round(slope)

@@ -30,7 +30,7 @@ class Problem:
     axis : UncertainAxis
     actuator : Actuator
     structure : Structure
-        Of the autopilot: its rate and gyro filter are in the loop.
+        Structure of the autopilot: its rate and gyro filter are in the loop.
     airspeeds_mps : tuple of float
     span_m : float
         0 where nobody measured it: then no gust rolls the aircraft.
@@ -46,7 +46,7 @@ class Problem:
 
     @property
     def period_s(self) -> float:
-        """Of the autopilot's loop."""
+        """Period of the autopilot's loop."""
         usual = {role: one.default for role, one in self.structure.settings.items()}
         return self.structure.loop(usual, self.airspeeds_mps[0]).period_s
 

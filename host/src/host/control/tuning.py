@@ -48,7 +48,7 @@ class Tuning:
     aircraft : str
     axes : tuple of AxisTuning
     yaw : YawTuning or None
-        Of the rudder, where the autopilot flies a damper and the answer has a model for it.
+        Tuning of the rudder, where the autopilot flies a damper and the answer has a model for it.
     outer : tuple of OuterCheck
         Path and height loops around, as far as the autopilot's were read.
     dated : str
@@ -56,7 +56,7 @@ class Tuning:
     notes : tuple of str
         What was not known, and what was taken in its place.
     release : str
-        Of the autopilot, as its log or the caller names it; empty where nobody does.
+        Release of the autopilot, as its log or the caller names it; empty where nobody does.
     """
 
     autopilot: Autopilot
@@ -215,13 +215,13 @@ def tune(
     autopilot : str
         ``ardupilot``, ``px4``, ``inav``, or ``mega``, the logger's hold.
     parameters : mapping of str to float, optional
-        Of the autopilot, as a log or a parameter file has them; its defaults without.
+        Parameters of the autopilot, as a log or a parameter file has them; its defaults without.
     airspeeds_mps : sequence of float
         Speeds that the gains hold at; least, trim and largest of the aircraft file without.
     release : str
-        Of the autopilot, such as ``4.5``; today's names of parameters without.
+        Release of the autopilot, such as ``4.5``; today's names of parameters without.
     seed : int
-        Of the aircraft drawn.
+        Seed of the aircraft drawn.
 
     Raises
     ------

@@ -48,7 +48,7 @@ class Required:
         worst : tuple of float
             Gain (dB) and phase margin (degrees) of the failed verification.
         least_share : float
-            Of the limit, where one lacked at all.
+            Least margin as a share of the limit, where one lacked at all.
         """
         limits = Required()
 
@@ -96,12 +96,12 @@ class Verification:
 
     @property
     def worst_gain_db(self) -> float:
-        """Of either loop."""
+        """Smallest gain margin of either loop."""
         return float(min(np.min(self.actuator.gain_db), np.min(self.attitude.gain_db)))
 
     @property
     def worst_phase_deg(self) -> float:
-        """Of either loop."""
+        """Smallest phase margin of either loop."""
         return float(min(np.min(self.actuator.phase_deg), np.min(self.attitude.phase_deg)))
 
     @property

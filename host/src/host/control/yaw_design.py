@@ -25,7 +25,7 @@ class PairMargins:
     aileron, rudder : tuple of float
         Gain (dB) and phase margin (degrees) at each actuator, the other loop closed.
     joint_disk : float
-        Of both changed together.
+        Disk margin of both changed together.
     stable : bool
     yaw_radps, before_yaw_radps : float
         Yaw rate in side gusts of 1 m/s, rms, with these gains and with the rudder at rest.
@@ -67,7 +67,7 @@ def design_yaw(problem: PairProblem, *, seed: int = 0) -> YawDesign:
     ----------
     problem : PairProblem
     seed : int
-        Of the aircraft drawn.
+        Seed of the aircraft drawn.
     """
     required = asked = Required()
     for k in range(ROUNDS):

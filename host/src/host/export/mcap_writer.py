@@ -35,9 +35,9 @@ def write_mcap(
     columns : mapping of str to (rows,) array
         NaN becomes null.
     times_ns : sequence of int
-        Of the rows, since 1970 (UTC).
+        Times of the rows, since 1970 (UTC).
     topic : str
-        Of the rows; events stand under ``/events``.
+        Topic of the rows; events stand under ``/events``.
     texts : mapping of str to str
         Unit and meaning of each column: into the schema.
     events : sequence of (int, str)

@@ -37,7 +37,7 @@ class FlightTask:
     date : str
         ``2026-11-23``, or empty if the date is to come from the log.
     version : str
-        Of this package and of its rows.
+        Version of this package and of its rows.
     """
 
     key: str

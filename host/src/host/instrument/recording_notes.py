@@ -15,7 +15,7 @@ def recording_notes(instrument: SensorErrorModel) -> list[str]:
     Parameters
     ----------
     instrument : SensorErrorModel
-        Of that flight: its `recording` says which surfaces were only commanded.
+        Error model of that flight: its `recording` says which surfaces were only commanded.
 
     Returns
     -------

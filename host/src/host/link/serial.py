@@ -51,7 +51,7 @@ class SerialPort:
     vendor_id, product_id : int or None
         USB ids; None for a port that is not on USB.
     serial_number : str
-        Of the USB device; empty where it has none, as clones.
+        Serial number of the USB device; empty where it has none, as clones.
     """
 
     device: str

@@ -94,7 +94,7 @@ class StatusLine:
     Parameters
     ----------
     board, version : str
-        Of the image that runs.
+        Board and version of the image that runs.
     image : str
         Its hash, eight hexadecimal digits; empty if it has none.
     fields : dict of str to str

@@ -34,7 +34,7 @@ class RowRate:
     rate_hz : float
         NaN where nobody knows.
     half_width_hz : float
-        Of the two-sided 95 % interval; 0 of one that was given.
+        Half-width of the two-sided 95 % interval; 0 of a rate that was given.
     origin : str
         ``given``, ``GPS`` or ``unknown``.
     """

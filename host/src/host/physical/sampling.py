@@ -176,9 +176,9 @@ def bend(sampled: Array, values: Array, index: NDArray[np.intp], weight: Array) 
         Instants, in any unit.
     values : Array, shape (n,)
     index : NDArray, shape (m,)
-        Of the sample before each instant wanted.
+        Index of the sample before each instant wanted.
     weight : Array, shape (m,)
-        Of the sample behind it, 0 to 1.
+        Weight of the sample behind it, 0 to 1.
 
     Returns
     -------

@@ -53,7 +53,8 @@ def read_datcom(text: str, mach: float = 0.0) -> PriorTable | None:
     text : str
         What Datcom wrote.
     mach : float
-        Of the flight. Of several altitudes the lowest is taken, of equal pages the last.
+        Mach number of the flight. The lowest of several altitudes is taken, the last of equal
+        pages.
 
     Returns
     -------

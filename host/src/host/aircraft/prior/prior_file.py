@@ -40,7 +40,7 @@ def read_prior(path: Path, airspeed_mps: float = 0.0) -> PriorTable:
     path : Path
         TOML, AVL's ST or SB output, Datcom's output, or an aircraft: its file or its name.
     airspeed_mps : float
-        Of the flight: which Mach number of several.
+        Airspeed of the flight: it says which of several Mach numbers is taken.
 
     Raises
     ------

@@ -46,7 +46,7 @@ class ArduPlaneLoop:
 
     @property
     def period_s(self) -> float:
-        """Of the main loop."""
+        """Period of the main loop."""
         return 1.0 / self.fixed["loop_hz"]
 
     def step(self, state: Array, angle_error: Array, rate: Array) -> tuple[Array, Array]:
@@ -76,7 +76,7 @@ class ArduPlane(TabledAxis):
     trim_mps : float
         Airspeed of the model.
     share : float
-        Of the surface's travel that full output is, below 1 where a mixer halves it.
+        Share of the surface's travel that full output is, below 1 where a mixer halves it.
     """
 
     trim_mps: float
@@ -98,7 +98,7 @@ class ArduPlane(TabledAxis):
 
     @property
     def slew_limit_per_s(self) -> float:
-        """Of x_RATE_SMAX, beyond which P and D are turned down; 0 is none.
+        """Slew limit by x_RATE_SMAX, beyond which P and D are turned down; 0 is none.
 
         The limiter sees 45 times P and D in radians (AC_PID.cpp).
         """

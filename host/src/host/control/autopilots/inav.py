@@ -59,7 +59,7 @@ class InavLoop:
 
     @property
     def period_s(self) -> float:
-        """Of the PID loop."""
+        """Period of the PID loop."""
         return 1.0 / self.fixed["loop_hz"]
 
     def step(self, state: Array, angle_error: Array, rate: Array) -> tuple[Array, Array]:

@@ -28,7 +28,7 @@ LOGGED = {
     "loop_hz": "IMU_GYRO_RATEMAX",
 }
 TORQUES = {axis: rf"CA_SV_CS\d+_TRQ_{axis[0].upper()}" for axis in ("roll", "pitch", "yaw")}
-# Of each axis with its default (fw_rate_control_params.c).
+# Parameter of each axis with its default (fw_rate_control_params.c).
 INTEGRAL_LIMITS = {
     "roll": ("FW_RR_IMAX", 0.2), "pitch": ("FW_PR_IMAX", 0.4), "yaw": ("FW_YR_IMAX", 0.2)
 }  # fmt: skip
@@ -66,7 +66,7 @@ class Px4Loop:
 
     @property
     def period_s(self) -> float:
-        """Of the gyro's publications."""
+        """Period of the gyro's publications."""
         return 1.0 / self.fixed["loop_hz"]
 
     def step(self, state: Array, angle_error: Array, rate: Array) -> tuple[Array, Array]:

@@ -46,7 +46,7 @@ class Loop(Protocol):
 
     @property
     def period_s(self) -> float:
-        """Of the difference equation."""
+        """Period of the difference equation."""
 
     @property
     def states(self) -> int:

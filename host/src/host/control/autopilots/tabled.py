@@ -38,7 +38,7 @@ class TabledAxis:
 
     @property
     def gyro_filter_hz(self) -> float:
-        """Of second order: INAV's is the slower of its kinds."""
+        """Frequency of a filter of second order: INAV's is the slower of its kinds."""
         return self.fixed["gyro_filter_hz"]
 
     @property
@@ -55,7 +55,7 @@ class TabledRudder:
     ----------
     fixed : mapping
     share, aileron_share : float
-        Of the surfaces' travel that full output is.
+        Share of the surfaces' travel that full output is.
     """
 
     fixed: Mapping[str, float]

@@ -18,7 +18,7 @@ class StateSpace:
     ----------
     name, method : str
     airspeed_mps : float
-        Of the trim.
+        Airspeed at trim.
     parameters : sequence of tuple
         Name, value and 95 % half-width of each.
     delayed : tuple of str

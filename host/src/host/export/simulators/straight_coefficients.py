@@ -21,7 +21,7 @@ class StraightCoefficients:
     ----------
     title : str
     alpha_rad, elevator_rad : float
-        Of the trim; the elevator is the one without pitching moment.
+        Angles at trim; the elevator is the one without pitching moment.
     slopes : dict of str to float
         ``CL_alpha`` and all others per radian and per p_hat, q_hat, r_hat; ``CL_0``, ``CY_0``,
         ``Cl_0``, ``Cm_0``, ``Cn_0``: the lines' values where all is zero.
@@ -35,7 +35,7 @@ class StraightCoefficients:
     stall_alpha_rad : float
         Where lift leaves its line upwards.
     airspeed_mps : float
-        Of the aircraft file's trim.
+        Airspeed at the aircraft file's trim.
     identified : tuple of str
         What was identified, with its interval; all else is the aircraft file's.
     """

@@ -35,7 +35,7 @@ def type_flights(rows: pd.DataFrame) -> list[LoadedFlight]:
     Parameters
     ----------
     rows : pandas.DataFrame
-        Of one type, as `FlightStore.rows` returns them.
+        Rows of one type, as `FlightStore.rows` returns them.
     """
     at = reference_cg(rows)
     found = rows[rows["state"] == IDENTIFIED].to_dict("records")

@@ -35,7 +35,7 @@ def fleet_page(model: TypeModel, found: list[AircraftHistory], rows: pd.DataFram
     model : TypeModel
     found : list of AircraftHistory
     rows : pandas.DataFrame
-        Of all flights of the type, those set aside too.
+        Rows of all flights of the type, those set aside too.
     """
     aside = rows[rows["state"] != IDENTIFIED]
     facts = (

@@ -28,7 +28,7 @@ class FleetAnswer:
     ----------
     models : list of TypeModel
     changes : list of list of AircraftHistory
-        Of each type.
+        Histories of each type's aircraft.
     written : list of Path
     """
 
@@ -59,7 +59,7 @@ def fleet_answer(rows: pd.DataFrame, output: Path) -> FleetAnswer:
     Parameters
     ----------
     rows : pandas.DataFrame
-        Of `FlightStore.rows`.
+        Rows of `FlightStore.rows`.
     output : Path
     """
     answer = FleetAnswer()

@@ -31,9 +31,9 @@ class FleetRun:
     known : int
         Kept by an earlier run.
     done, set_aside : int
-        Of this run.
+        Flights of this run.
     rows : pandas.DataFrame
-        Of all flights given.
+        Rows of all flights given.
     """
 
     flights: int

@@ -29,7 +29,7 @@ class FleetSources:
     table : sequence of TableRow
     models, accept : tuple of str
     hashes : dict
-        Of logs seen before (`log_id`).
+        Hashes of logs seen before (`log_id`).
     """
 
     sources: Sequence[str]

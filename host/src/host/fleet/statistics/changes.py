@@ -19,7 +19,7 @@ from host.arrays import Array
 
 BASELINE = 8  # first flights, with which later ones are compared
 WINDOW = 4  # flights over which a change is looked for
-# Of a hundred flights of unchanged aircraft 0.4 begin an alarm (`studies.fleet_changes`).
+# An alarm begins in 0.4 of a hundred flights of unchanged aircraft (`studies.fleet_changes`).
 THRESHOLD = 3.75
 _NEAR = 4.0  # a cause whose squared statistic is at most so much below the best is named too
 _MOVED = 2.0  # standard deviations
@@ -41,7 +41,7 @@ class Alarm:
     cause : str
         The likeliest.
     size : float
-        Of the change, in the unit of its pattern.
+        Size of the change, in the unit of its pattern.
     strength : float
         Size over its standard deviation.
     others : tuple of str
@@ -90,7 +90,7 @@ class ChangeTest:
         Parameters
         ----------
         first : sequence of (values, own)
-            Of each aircraft its first flights, as in `alarms`.
+            First flights of each aircraft, as in `alarms`.
         """
         squares: dict[str, list[float]] = {name: [] for name in self.patterns}
         freedom = 0

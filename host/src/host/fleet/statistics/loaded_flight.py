@@ -38,7 +38,7 @@ class LoadedFlight:
     date, label : str
         When it was flown, and what it is called in a picture.
     conditions : dict
-        Of the flight and its aircraft file.
+        Conditions of the flight and its aircraft file.
     watched : dict of str to (float, float)
         Value and standard deviation of quantities that are no derivatives (`watched_quantities`).
     """

@@ -62,7 +62,7 @@ class TypeEffect:
     Attributes
     ----------
     mean, between, within : Interval
-        Of the type; standard deviations between its aircraft and between flights of one.
+        Mean of the type; standard deviations between its aircraft and between flights of one.
     mean_deviation : float
         Standard deviation of the mean by aircraft and flights.
     shared_deviation : float
@@ -103,7 +103,7 @@ def type_effect(data: FleetEstimates, known: KnownSpreads | None = None) -> Type
     Parameters
     ----------
     data : FleetEstimates
-        Of two aircraft or more.
+        Estimates of two aircraft or more.
     known : KnownSpreads, optional
         Standard deviations not to be estimated; the intervals are then an oracle's.
     """

@@ -37,7 +37,7 @@ class FleetEstimates:
     value : Array, shape (flights,)
         Sorted by aircraft.
     variance : Array, shape (flights,)
-        Of the flight's own error of estimation, without any shared one.
+        Variance of the flight's own error of estimation, without any shared one.
     aircraft : IntArray, shape (flights,)
         From 0, rising.
     local : Array, shape (flights, r)
@@ -103,13 +103,13 @@ class Reduced:
     Attributes
     ----------
     information : float
-        Of the mean, 1 / its variance; 0 where each aircraft has a mean of its own.
+        Information of the mean, 1 / its variance; 0 where each aircraft has a mean of its own.
     mean : float
         Generalised least squares.
     quadratic : float
         y'Py, the weighted squares of what the mean leaves.
     log_determinant : float
-        Of the covariance of all values.
+        Logarithm of the determinant of the covariance of all values.
     """
 
     information: float
@@ -176,7 +176,7 @@ def restricted_likelihood(data: FleetEstimates) -> tuple[float, float]:
     Parameters
     ----------
     data : FleetEstimates
-        Of two aircraft or more.
+        Estimates of two aircraft or more.
     """
     scale = data.grain
     floor = 0.0 if float(np.min(data.variance)) > 0.0 else _ZERO_SHARE

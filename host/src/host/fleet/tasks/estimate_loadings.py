@@ -56,7 +56,7 @@ def coefficient_loadings(fit: CoefficientFit, errors: InstrumentErrors) -> Loade
     Parameters
     ----------
     fit : CoefficientFit
-        Of one flight.
+        Fit of one flight.
     errors : InstrumentErrors
     """
     count = len(fit.derivatives)
@@ -81,7 +81,7 @@ def split_covariance(
     Parameters
     ----------
     names, values
-        Of the estimates.
+        Names and values of the estimates.
     total : Array, shape (P, P)
     shifts : dict of str to (P,) Array
         By one standard deviation of each error.

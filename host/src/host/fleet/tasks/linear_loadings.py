@@ -25,7 +25,7 @@ def linear_loadings(answers: Sequence[Answer], errors: InstrumentErrors) -> Load
     Parameters
     ----------
     answers : sequence of Answer
-        Of different axes. Those without coefficients say nothing.
+        Answers for different axes. Those without coefficients say nothing.
     errors : InstrumentErrors
     """
     estimated = [a.coefficient_parts for a in answers if a.coefficient_parts is not None]

@@ -257,7 +257,7 @@ def check_readable(theirs: dict[str, str]) -> None:
     Raises
     ------
     FleetError
-        Of the first that does not.
+        A computer has another version; the first is named.
     """
     for worker, found in theirs.items():
         if found:
