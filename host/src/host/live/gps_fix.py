@@ -17,7 +17,7 @@ class GpsFix:
     t_s : float
         On the clock of the rows.
     word : str
-        Of the schema's `gps_fix`, such as ``fix_3d``.
+        Word of the schema's `gps_fix`, such as ``fix_3d``.
     satellites : int
     place : (float, float, float) or None
         Latitude, longitude (deg), height above mean sea level (m); None without a fix.

@@ -17,7 +17,7 @@ class LinkState:
     ----------
     rows_per_s, bytes_per_s : float
     lost_percent : float
-        Of the rows that should have come.
+        Share of the rows that should have come.
     age_s : float
         Since anything could be decoded; infinite before the first frame.
     """

@@ -43,7 +43,7 @@ class SlowFrame:
     Parameters
     ----------
     name : str
-        Of the schema, such as ``gps``.
+        Name in the schema, such as ``gps``.
     row : numpy.void
         Its fields, raw.
     t_s : float

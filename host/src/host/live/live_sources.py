@@ -39,7 +39,7 @@ class Source(Protocol):
 
     @property
     def baud(self) -> int:
-        """Of a serial line; 0 for none."""
+        """Baud rate of a serial line; 0 for none."""
         ...
 
     @property

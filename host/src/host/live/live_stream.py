@@ -50,7 +50,7 @@ class LiveStream:
     texts : collection of bytes
         Schemas known besides the released ones.
     row_rate_hz : float, optional
-        Of rows of text that are played again; others are placed where they arrive.
+        Rate of rows of text that are played again; others are placed where they arrive.
 
     Attributes
     ----------

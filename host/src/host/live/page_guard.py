@@ -45,7 +45,7 @@ class PageGuard:
     port : int
         Where the page is served.
     addresses : tuple of str
-        Of this computer in its network, with `--lan`.
+        Addresses of this computer in its network, with `--lan`.
     pilot_token, viewer_token : str
         The first may mark, and only from this computer; the second may look.
     """

@@ -41,7 +41,7 @@ class TextRows:
     ----------
     rows : int
     variant : str
-        Of `host.original.rows.VARIANTS`; empty before the first row.
+        One of `host.original.rows.VARIANTS`; empty before the first row.
     """
 
     def __init__(self, calibration: Calibration, rate_hz: float | None = None) -> None:

@@ -29,8 +29,8 @@ class WorkerProcess:
     name : str
         For a list of processes.
     work : callable
-        Of a module, called in the process with a connection and `given`; it receives questions and
-        sends answers until the connection ends.
+        Function of a module, called in the process with a connection and `given`; it receives
+        questions and sends answers until the connection ends.
     *given
         What can be sent to a process.
     """

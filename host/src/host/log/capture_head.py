@@ -27,7 +27,7 @@ class CaptureHead:
     source : str
         As the user named it.
     baud : int
-        Of a serial line; 0 for none.
+        Baud rate of a serial line; 0 for none.
     started_utc : str
         Computer time when the capture began, ISO 8601.
     schema : str

@@ -27,9 +27,9 @@ class FlownInput:
     Attributes
     ----------
     row : int
-        Of the card, from 0.
+        Row of the flight card, counted from 0.
     start_s, end_s : float
-        Of the shape, in the time of the table.
+        Begin and end of the shape, in the time of the table.
     shape, reason : str
         Names of ``card_shape`` and of ``input_end``.
     amplitude_us : tuple of float

@@ -10,7 +10,7 @@ from host.errors import NotALogError
 from host.files.regular import file_or_folder
 from host.wire.blocks import scan
 
-# Of each file in a folder this much is read: more than a few destroyed blocks cover.
+# How much of each file in a folder is read: more than a few destroyed blocks cover.
 _HEAD_BYTES = 64 << 10
 
 

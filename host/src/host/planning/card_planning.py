@@ -63,7 +63,7 @@ class Point:
     amplitudes : tuple of float
         One per axis, deg.
     width_s, duration_s : float
-        Of a step of the input, and of the test point.
+        Length of a step of the input, and of the test point.
     airspeed_mps, alpha_deg, beta_deg, bank_deg, pitch_deg : float
     roll_rate_degps, pitch_rate_degps, yaw_rate_degps : float
     load_factor : tuple of float
@@ -250,7 +250,7 @@ def point_of(record: FlightRecord, data: AirData, s: Segment, w: Window) -> Poin
     ----------
     record : FlightRecord
     data : AirData
-        Of it.
+        Air data of the record.
     s, w : Segment, Window
         What was asked for, and when it was flown.
     """

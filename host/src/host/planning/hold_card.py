@@ -101,7 +101,7 @@ def hold_part(
     ----------
     gains : HoldGains
     calibration : Calibration
-        Of the servos that fly it.
+        Calibration of the servos that fly it.
     authority_us : sequence of int
         Largest deflection of aileron and elevator.
 

@@ -136,7 +136,7 @@ def identified_range(base: Aircraft, models: Sequence[Path], count: int) -> list
     models : sequence of Path
         As `with_models` takes them.
     count : int
-        Of all; the first is the estimate itself.
+        How many in all; the first is the estimate itself.
     """
     drawn = [
         with_models(random_aircraft(base, seed), models, np.random.default_rng([seed, 6]))

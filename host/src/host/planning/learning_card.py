@@ -89,7 +89,7 @@ def learning_card(
         ``pitch``, ``roll`` or ``yaw``.
     at : LearningCondition
     calibration : Calibration, optional
-        Of the instrument; the default one without.
+        Calibration of the instrument; the default one without.
 
     Returns
     -------
@@ -134,7 +134,7 @@ def learned_axes(
         Name or file, with coefficients.
     card : Card
     calibration : Calibration, optional
-        Of the instrument; the default one without.
+        Calibration of the instrument; the default one without.
     """
     plane = load(aircraft)
     speed = card.flight.airspeed_mps or plane.scalar("trim.airspeed_mps")

@@ -59,7 +59,7 @@ def logger_card(
         Trims and turns are the pilot's and are left out.
     aircraft : Aircraft
     calibration : Calibration
-        Of the instrument that flies it.
+        Calibration of the instrument that flies it.
     envelope : Envelope, optional
     learned : sequence of AxisCard
         What the logger learns in flight (`learned_axes`): rows that move the same teach in

@@ -120,7 +120,7 @@ class NextPoints:
         Parameters
         ----------
         known : mapping
-            Of the derivatives that an estimate tells.
+            Relative half-widths of the derivatives that an estimate tells.
         flown : sequence of Segment
             What that estimate is made of.
         wanted_percent : mapping of str to float

@@ -40,7 +40,7 @@ class AxisCard:
     harmonics : tuple of int
         Times 50/512 Hz.
     advance_s, curvature_s2 : tuple of float
-        Of the angle and the surfaces: a signal x is x + advance x' + curvature x''.
+        Sampling of the angle and the surfaces: a signal x is x + advance x' + curvature x''.
     lever : float
         Counts of the angle at the CG per count of the rate that turns with it.
     product : float

@@ -54,7 +54,7 @@ class OptimalCard:
     ----------
     card : Card
     point_s : float
-        Of one point, trim and rest with it.
+        Length of one point, trim and rest with it.
     seconds : (aircraft,) array
         Until noise and gusts leave the wanted half-widths, of each drawn aircraft; linear theory.
     """
@@ -94,7 +94,7 @@ def optimal_card(
     wanted_share : float
         95 % half-width of the principal derivatives over their values.
     duration_s : float
-        Of one multisine; at most 20 s fit a row of the logger's card.
+        Length of one multisine; at most 20 s fit a row of the logger's card.
     fleet : sequence of Aircraft
         For which it is designed, in place of aircraft drawn from the prior's range.
 
@@ -129,7 +129,7 @@ def optimal_card(
     point = card.segments[1]
     point_s = length_s(card, point)
     scaled = dict(zip(point.axes, point.amplitudes, strict=True))
-    # Of one point, of each aircraft: the variance of the widest wanted derivative over its square.
+    # Variance of the widest wanted derivative over its square, of one point, for each aircraft.
     variance = [
         max(b.widest(k, (scaled[axis] / size) ** 2) for b in blocks
             for axis, size in list(b.amplitudes_deg.items())[:1])

@@ -59,15 +59,15 @@ class PointPromise:
     amplitudes : tuple of float
         One per axis, deg.
     width_s : float
-        Of a step of the input.
+        Length of a step of the input.
     widths : tuple of PredictedWidth
-        Of the derivatives in `AXIS_DERIVATIVES` of its axes; medians of some flights.
+        Widths of the derivatives in `AXIS_DERIVATIVES` of its axes; medians of some flights.
     failures : tuple of str
         Why a flight gave no answer.
     recorded : bool
         Flown through the recorder's own program; False where there is no compiler to build it.
     noise : ResidualSpectra
-        Of the residuals of each equation: geometric means of these flights.
+        Spectra of the residuals of each equation: geometric means of these flights.
     """
 
     kind: str
@@ -178,7 +178,7 @@ def promise_points(
     gusts_mps : float, optional
         Standard deviation of the vertical gust; the card's, or that of a calm morning.
     flights : int
-        Of each point.
+        Flights of each point.
     first_seed : int
     progress : callable, optional
         Called with the share that is done.

@@ -100,7 +100,7 @@ def with_prior(
     prior : PriorTable
         As `host.aircraft.prior.prior_file.read_prior` reads it.
     alpha_rad : float
-        Of the trim.
+        Angle of attack at trim.
 
     Returns
     -------

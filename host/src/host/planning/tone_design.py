@@ -33,7 +33,7 @@ def powers(
     Parameters
     ----------
     tables : sequence of ToneTable
-        Of the same tones on drawn aircraft.
+        Tables of the same tones on drawn aircraft.
     block : str
     allowed : (k,) array of bool
         Tones to choose from.
@@ -126,10 +126,10 @@ def phases(
     Parameters
     ----------
     table : ToneTable
-        Of the chosen tones only.
+        Table of the chosen tones only.
     amplitude_rad : (k,) array
     harmonic : (k,) array of int
-        Of the point's duration.
+        Harmonics of the point's duration.
     rng : numpy Generator
     """
     at = np.arange(GRID) / GRID

@@ -52,11 +52,11 @@ class ToneTable:
         Which of the block's surfaces.
     frequency_hz : (k,) array
     information : (k, rows, n, n) array
-        Of unit amplitude (rad) over one second.
+        Information of unit amplitude (rad) over one second.
     value : (rows, n) array
         The derivatives themselves; nuisance parameters among them.
     response : (k, channels) complex array
-        Of the channels of `LIMITS` and of the surface and its rate, over their limits.
+        Response of the channels of `LIMITS` and of the surface and its rate, over their limits.
     """
 
     axis: IntArray

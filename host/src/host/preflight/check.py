@@ -9,7 +9,7 @@ from host.preflight.sample import Sample, SlowReading
 
 
 class State(StrEnum):
-    """Of a check."""
+    """State of a check."""
 
     WAITING = "waiting"
     SEEN = "seen"

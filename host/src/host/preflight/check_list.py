@@ -143,7 +143,7 @@ def left_out(words: Collection[str]) -> set[str]:
     Raises
     ------
     UsageError
-        Of an unknown word.
+        A word is unknown.
     """
     found: set[str] = set()
     for word in words:

@@ -25,7 +25,7 @@ def list_lines(said: dict[str, Any], width: int = 100, rows: int = 60) -> list[s
     said : dict
         As `Preflight.as_json` gives it.
     width, rows : int
-        Of the terminal; where it is too low what is green is one line.
+        Size of the terminal; where it is too low what is green is one line.
     """
     green = [f"ok {item['title']}"[:width] for item in said["items"] if item["state"] == "seen"]
     lines = [line for item in said["items"] for line in _item_lines(item, width)]

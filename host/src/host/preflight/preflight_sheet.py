@@ -108,7 +108,7 @@ def sheet_lines(text: str) -> list[str]:
     Parameters
     ----------
     text : str
-        Of a file.
+        Text of a file.
     """
     try:
         document = parse_toml(text, "sheet", UsageError)

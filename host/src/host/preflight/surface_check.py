@@ -80,7 +80,7 @@ class SurfaceCheck(AskedCheck):
     Parameters
     ----------
     surface : str
-        Of `SURFACES`.
+        One of `SURFACES`.
     limit_deg : float or None
         Travel each way, of the aircraft file; None where it has none.
     pulse_slope : float

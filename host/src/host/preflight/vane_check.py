@@ -21,7 +21,7 @@ class VaneCheck(AskedCheck):
     Parameters
     ----------
     channel : str
-        Of `VANES`.
+        One of `VANES`.
     others : tuple of str
         Vanes that must stand still meanwhile.
     """

@@ -36,7 +36,7 @@ class WalkSource:
     ----------
     aircraft : Aircraft
     fault : str
-        Of `GROUND_FAULTS`, empty for none.
+        One of `GROUND_FAULTS`, empty for none.
     seed : int
     speed : float
         Seconds of the walk per second.
@@ -93,7 +93,7 @@ def walk_source(
     Raises
     ------
     UsageError
-        Of an unknown fault, or another virtual flight; a card that holds and no recorder.
+        A fault is unknown, or another virtual flight; a card that holds and no recorder.
     """
     found = SPEED.fullmatch(text)
     speed = 1.0

@@ -92,7 +92,7 @@ def surfaces(pulses_us: Mapping[int, Array], parameters: Mapping[str, float]) ->
     pulses_us : mapping of int to (n,) array
         Pulse of each output, counted from 1; 0 is no pulse.
     parameters : mapping of str to float
-        Of the log.
+        Parameters in the log.
     """
     demands: dict[int, list[Array]] = {}
     pins: dict[int, list[int]] = {}

@@ -75,7 +75,7 @@ class AutopilotFlight:
     flown : Airborne
     judgement : Judgement
     number : int
-        Of the flight in its file, from 1.
+        Number of the flight in its file, from 1.
     listed : tuple of FlightLine
         All flights of the file, where there are several.
     """

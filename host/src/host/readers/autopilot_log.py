@@ -83,7 +83,7 @@ class AutopilotLog:
     messages : mapping of str to mapping of int to Messages
         By name and instance.
     parameters : mapping of str to float
-        Of one that changed the value that stood longest; `Parameters` has all.
+        Values by name, the one that stood longest where it changed; `Parameters` has all.
     damage : tuple of str
         A sentence for each loss, error or unproven range.
     lost : int

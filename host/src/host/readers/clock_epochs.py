@@ -27,7 +27,7 @@ def epoch_starts(clocks: Iterable[tuple[NDArray[np.integer], Array]]) -> list[in
     Parameters
     ----------
     clocks : iterable of (places, times)
-        Of each kind of record: where each stands in the log, ascending, and its time, s.
+        Where each record of a kind stands in the log, ascending, and its time, s; a pair per kind.
     """
     spans: list[tuple[int, int]] = []
     for places, t_s in clocks:

@@ -24,8 +24,8 @@ REPEATED_SHARE = 0.5  # of the rows between samples that have a value, of a hold
 
 @dataclass(frozen=True, slots=True)
 class Sampling:
-    """Of one column: the step of its numbers (0: none is seen), rows each value stays (1: not
-    held), and at which rows it was sampled."""
+    """Sampling of one column: the step of its numbers (0: none is seen), rows each value stays (1:
+    not held), and at which rows it was sampled."""
 
     step: float
     hold: int

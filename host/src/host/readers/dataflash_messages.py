@@ -40,8 +40,8 @@ WANTED: dict[str, tuple[str, ...]] = {
     "MODE": ("TimeUS", "TimeMS", "ModeNum"), "SIDD": ("TimeUS",), "ATRP": ("TimeUS",),
 }  # fmt: skip
 TEXTS = {("PARM", "Name"), ("MSG", "Message"), ("VER", "FWS")}
-# Of a kind the first that it has. Old releases write the GPS week's time as TimeMS of a GPS record,
-# and their own clock as its T.
+# Fields with the time; the first that a kind has counts. Old releases write the GPS week's time as
+# TimeMS of a GPS record, and their own clock as its T.
 STAMPS = {"TimeUS": 1e-6, "T": 1e-3, "TimeMS": 1e-3}
 # The field that numbers the instances of a kind, in the releases that have one.
 INSTANCE = {"IMU": "I", "ARSP": "I", "BARO": "I", "GPS": "I", "VIBE": "IMU", "XKF1": "C"}

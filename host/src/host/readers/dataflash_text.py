@@ -39,7 +39,7 @@ def read_text_records(path: Path, wanted: Collection[str]) -> TextRecords:
             parts = [part.strip() for part in line.rstrip("\r\n").split(",")]
             name = parts[0]
             if name == "FMT" and len(parts) > 5:
-                # Of two definitions the first counts: a script's rows are then no records.
+                # The first of two definitions counts: a script's rows are then no records.
                 own = parts[4], parts[5:]
                 if layouts.setdefault(parts[3], own) != own:
                     twice[parts[3]] = None

@@ -28,7 +28,7 @@ def held_output(signal: Signal, period_s: float) -> tuple[Array, Array]:
     signal : Signal
         As logged.
     period_s : float
-        Of the pulses.
+        Period of the pulses.
     """
     t, values = signal.t_s, signal.values
     usual_s = 1.0 / signal.rate_hz if signal.rate_hz else 0.0
@@ -54,7 +54,7 @@ def _between(t: Array, values: Array, before: IntArray, share: Array) -> Array:
     before : IntArray, shape (n,)
         Record before each instant.
     share : Array, shape (n,)
-        Of the way to the next.
+        Share of the way to the next.
     """
     line = values[before] + share * (values[before + 1] - values[before])
     s, last = share, len(values) - 1

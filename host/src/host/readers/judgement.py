@@ -65,7 +65,7 @@ class Judgement:
     settings : list of str
         What to change for the next flight, by the autopilot's parameters.
     rates_hz : dict of str to float
-        Of each channel.
+        Rate of each channel.
     """
 
     refusal: str

@@ -72,7 +72,7 @@ def frames_of(data: bytes, extras: Mapping[int, int]) -> Frames:
     data : bytes
         Begins with a frame, or with damage.
     extras : mapping of int to int
-        Of each wanted kind what its checksum counts besides; frames of others are not proven.
+        What the checksum of each wanted kind counts besides; frames of others are not proven.
     """
     view = np.frombuffer(data, dtype=np.uint8)
     walked, rest = _walk(data)

@@ -187,7 +187,7 @@ class FlightEstimator:
 def _moved(answer: CoefficientAnswer) -> set[str]:
     """Return the surfaces whose input is in the estimate, and the empty word for what needs none.
 
-    Of an input that a gap took the response alone may be left.
+    An input that a gap took may have left the response alone.
     """
     return {"", *(m.axis for m in answer.used if m.input_end_s - m.start_s > _INPUT_S)}
 

@@ -98,7 +98,7 @@ class PointEstimator:
         point : Segment
             The card's.
         data : bytes
-            Of the radio.
+            Bytes of the radio.
         flown : DetectedManeuver
             Its input, in seconds from the last row of `data`: before it they are negative.
         """

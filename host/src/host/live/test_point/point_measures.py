@@ -39,10 +39,10 @@ class PointMeasures:
     edge : float
         The same over the least step that `host maneuvers` takes for one of an input.
     length : float
-        Of the input over the wanted one.
+        Length of the input over the wanted one.
     deviations : (k,) array
-        Of the wanted derivatives, as the flown movement of the surfaces allows, over those of the
-        card's input.
+        Deviations of the wanted derivatives, as the flown movement of the surfaces allows, over
+        those of the card's input.
     unquiet : float
         Rate about the axis in the second before, over its largest afterwards: rms.
     others : float
@@ -54,7 +54,7 @@ class PointMeasures:
     airspeed_change : float
         Largest change during the point, share.
     gusts : float
-        Of the air before, over those of the card (of a calm morning where it names none).
+        Gusts of the air before, over those of the card (of a calm morning where it names none).
     lost : float
         Share of the rows that did not arrive, of the point and of the moment before that an
         estimate uses too.

@@ -148,7 +148,7 @@ def estimated_width(
     wanted : Segment
     estimate : PointEstimate
     moved : float
-        Of `moved_width`.
+        Width by `moved_width`.
     """
     widths, share = estimate.expected, CALM_SHARE
     if m.gusts > CALM:

@@ -34,7 +34,7 @@ class RecentFlight:
 
     @property
     def airspeed_mps(self) -> float:
-        """Of the last row; NaN where it has none."""
+        """Airspeed of the last row; NaN where it has none."""
         return float(self._rows[-1][1]) if self._rows else np.nan
 
     def add(self, update: LiveUpdate) -> None:
