@@ -33,7 +33,7 @@ import json
 from host.aircraft import propulsion
 from host.compiled import Kernel
 from host.sysid import __main__ as of_sysid
-from host.sysid.numerics import recursion
+from host.sysid.numerics import intermittent_filter, recursion
 from host.thesis import __main__ as of_thesis, hopfield
 recursion.WORTH_COMPILING = propulsion.WORTH_COMPILING = 0.0
 of_sysid.build_kernels()
@@ -41,21 +41,27 @@ of_thesis.build_kernels()
 
 def codes():
     found = {}
-    for module in (recursion, propulsion, hopfield):
+    for module in (recursion, intermittent_filter, propulsion, hopfield):
         for name, thing in vars(module).items():
             if isinstance(thing, Kernel) and thing._machine is not None:
                 found[name] = len(thing._machine.signatures)
     return found
 
 built = codes()
+from dataclasses import replace
 import numpy as np
 from host.aircraft.powerplant import powerplant
 from host.sysid.estimators import fit
 from studies.navion import navion_structured
 from studies.data import TRUTH, with_rates
 model = navion_structured().with_start(1.1 * TRUTH)
-for method in ("output-error", "filter-error", "hopfield-whitened"):
-    fit(method, model, [with_rates(1, snr=10.0)])
+whole = with_rates(1, snr=10.0)
+seen = np.ones(whole.outputs.shape, dtype=bool)
+seen[1::2, 0] = False
+slow = replace(whole, sampled=seen, rates=None)
+for method, data in (("output-error", whole), ("filter-error", whole), ("filter-error", slow),
+                     ("hopfield-whitened", whole)):
+    fit(method, model, [data])
 powerplant("ultrastick25e").run(*np.full((3, 9), 0.5), 0.03)
 print(json.dumps([built, codes()]))
 """
@@ -93,7 +99,7 @@ def test_what_a_process_did_before_changes_no_answer() -> None:
 
 def test_every_kernel_is_built_in_the_types_that_methods_use() -> None:
     built, used = json.loads(printed(BUILT))
-    assert set(built) >= {"propagate_block", "rotor_steps", "iterate", "iterate_until"}
+    assert set(built) >= {"propagate_block", "_filter", "rotor_steps", "iterate", "iterate_until"}
     assert used == built
 
 
