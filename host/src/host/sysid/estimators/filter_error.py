@@ -42,6 +42,7 @@ def fit_filter_error(
     roughly: bool = False,
     compare_noise: bool = True,
     hac: bool = False,
+    must_end: bool = False,
 ) -> FitResult:
     """Fit by filter error.
 
@@ -66,11 +67,14 @@ def fit_filter_error(
         Ask whether coloured measurement noise explains the data better (`compare_noise_models`).
     hac : bool
         Inflate standard errors by the autocorrelation of the scores (`hac_inflation`).
+    must_end : bool
+        Refuse a search that neither converges nor ends near its optimum, before a result is made.
 
     Raises
     ------
     IdentificationError
-        If no start is finite, or there is no compiler for a filter of so many samples.
+        If no start is finite, or there is no compiler for a filter of so many samples; with
+        `must_end` also if the search did not end.
     """
     slow = needs_compiler(model, maneuvers)
     if slow:
@@ -84,10 +88,12 @@ def fit_filter_error(
     found = gauss_newton(objective, theta, max_iterations=MAX_ITERATIONS, step_limit=limit)
     if found is None:
         raise IdentificationError(f"model {model.name}: the Kalman filter fails at the start")
+    creeps = f"no convergence: last step {found.step:.3g} bounds long"
+    if must_end and not _near(found.step, converged=found.converged):
+        raise IdentificationError(creeps)
     covariance = covariance_from_information(found.information)
     theta, point, n_model = found.theta, found.trial, problem.n_model
     factor = _inflation(problem, found, covariance) if hac else np.ones(len(theta))
-    creeps = f"no convergence: last step {found.step:.3g} bounds long"
     warnings = [*(() if found.converged else (creeps,)), *inflation_lines(model, factor)]
     result = FitResult(
         method="filter error",
@@ -140,7 +146,11 @@ def _inflation(
 def near_its_optimum(result: FitResult) -> bool:
     """Return whether a search has ended, or creeps by far less than its intervals."""
     last = float(np.max(result.details["last_step_bounds"]))
-    return result.converged or last < NEAR_BOUNDS
+    return _near(last, converged=result.converged)
+
+
+def _near(last_bounds: float, *, converged: bool) -> bool:
+    return converged or last_bounds < NEAR_BOUNDS
 
 
 def information_at(

@@ -180,11 +180,11 @@ def fit_gust_state(
             noise=noise,
             roughly=roughly,
             compare_noise=False,
+            must_end=True,
         )
-        failure = "" if near_its_optimum(result) else result.warnings[0]
     except IdentificationError as error:
         failure = str(error)
-    if not failure:
+    else:
         innovations = innovations_of(result, augmented, maneuvers)
         details = dict(result.details)
         if isinstance(influence := details.get("maneuver_influence"), np.ndarray):
