@@ -49,7 +49,8 @@ class CoefficientParts:
     statistical : Array, shape (K, K)
         Covariance by the fit alone.
     quantile : Array, shape (K,)
-        Of a two-sided 95 % interval, in standard errors: Student's where maneuvers are few.
+        Quantile of a two-sided 95 % interval, in standard errors: Student's where maneuvers are
+        few.
     assumed : dict of str to (K,) Array
         Shift by one standard deviation of mass, inertia, thrust and upwash, and of the pitots where
         `sensed` has nothing of them, by error.
@@ -78,17 +79,17 @@ def coefficient_parts(
     Parameters
     ----------
     result : FitResult
-        Of a model whose parameters carry the template names (Z_alpha, M_q, L_p ...).
+        Fit of a model whose parameters carry the template names (Z_alpha, M_q, L_p ...).
     airframe : AirframeData
         Mass properties and sizes.
     condition : Condition
         Airspeed and dynamic pressure of the maneuvers.
     shifts : sequence of ShiftedEstimate
-        Of the derivatives, by one deviation of each sensor error.
+        Shifts of the derivatives, by one deviation of each sensor error.
     errors : InstrumentErrors, optional
         What the pitots may be wrong by, where `shifts` has nothing of them; standard ones without.
     thrust : PathThrust, optional
-        Of the maneuvers, which is in the derivatives; none without.
+        Thrust of the maneuvers, which is in the derivatives; none without.
     """
     path_thrust = thrust or PathThrust(0.0, 0.0)
     # Coefficients go with derivatives in proportion.

@@ -41,7 +41,7 @@ class LeftOutTerm:
         Its column is nearly made of the states: what is left of it to tell the term is no larger
         than its noise, which makes the term small. Its deviation stands whatever the data say.
     gain : float
-        Of its column: the term is per 1 over it.
+        Gain of its column: the term is per 1 over it.
     """
 
     name: str
@@ -123,13 +123,13 @@ def acting_terms(
     model : LinearModel
     trim : Trim
     name : str
-        Of the derivative.
+        Name of the derivative.
     row : str
         State in whose equation it stands.
     column : int
-        Of the input.
+        Column of the input.
     gain : float
-        Of the input.
+        Gain of the input.
     """
     V, sine, cosine = trim.airspeed_mps, np.sin(trim.alpha_rad), np.cos(trim.alpha_rad)
     measured = {

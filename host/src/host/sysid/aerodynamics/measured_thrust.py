@@ -11,8 +11,9 @@ from host.aircraft.powerplant import Powerplant, without_propeller
 from host.arrays import Array
 from host.sysid.models.thrust_column import THRUST
 
-# Of a small fixed-pitch propeller in level flight, where nothing says what its own is: wind-tunnel
-# data of such propellers (UIUC propeller data site, volume 1) have 0.5 to 0.7 about their best.
+# Efficiency of a small fixed-pitch propeller in level flight, where nothing says what its own is:
+# wind-tunnel data of such propellers (UIUC propeller data site, volume 1) have 0.5 to 0.7 about
+# their best.
 EFFICIENCY, EFFICIENCY_SHARE = 0.6, 0.15
 LEAST_MPS = 3.0  # below, thrust from power and airspeed is none
 

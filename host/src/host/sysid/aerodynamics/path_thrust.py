@@ -52,7 +52,7 @@ def path_thrust(
     cuts : sequence of mapping
         All columns of each maneuver.
     powerplant : Powerplant or None
-        Of the aircraft file.
+        Powerplant of the aircraft file.
     airframe : AirframeData
     trim : Trim
     condition : Condition

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from host.sysid.models.templates import Trim
 
 THRUST_ROWS = {"airspeed_mps": "D_thrust", "alpha_rad": "Z_thrust", "q_radps": "M_thrust"}
-# Of thrust, rms: what changes less moves a model by less than its noise does.
+# Least change of thrust, as a share of it, rms: a smaller one moves a model by less than its noise
+# does.
 LEAST_SHARE = 0.03
 THRUST_AS_INPUT = "measured thrust changed and is an input of its own: D_V is at constant thrust"
 NORMAL_SHARE = 0.2  # of thrust that acts normal to the path, one deviation

@@ -32,9 +32,9 @@ def with_unmeasured(
     model : LinearModel
         That was fitted.
     estimate : Array
-        Of its parameters, these first.
+        Estimate of its parameters, these first.
     trim : Trim
-        Of steady flight in place of what nobody measured; wings bank by the rolling measured.
+        Trim of steady flight in place of what nobody measured; wings bank by the rolling measured.
     """
     found = {**_angles_by_force(columns, model, estimate), **columns}
     still = np.zeros(len(columns["t_s"]))

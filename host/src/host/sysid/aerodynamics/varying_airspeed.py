@@ -31,8 +31,8 @@ MEASURED = (
     "airspeed_mps", "alpha_rad", "beta_rad", *RATES, "phi_rad", "theta_rad",
     "ax_mps2", "ay_mps2", "az_mps2",
 )  # fmt: skip
-# Of airspeed, whose noise would multiply every term: as long as the data allow. In calm air 0.1 s
-# left as much of it in N_dr as all other noise together.
+# Smoothing of airspeed, whose noise would multiply every term: as long as the data allow. In calm
+# air 0.1 s leaves as much of it in N_dr as all other noise together.
 SMOOTH_S = (0.05, 0.1, 0.2, 0.4)
 # What follows lift, with a parameter of its own: name, row, column, and what multiplies the column.
 # Drag is a parabola in lift, of which the template has not that of pitching; dihedral, roll by
@@ -80,7 +80,7 @@ class VaryingModel:
     spin_kgm2ps : tuple of float
         Angular momentum of the rotor along x and z.
     left_out : tuple of LeftOutTerm
-        Of a reduced template, as parameters behind its own.
+        Terms of a reduced template, as parameters behind its own.
     thrust : tuple of LeftOutTerm
         What measured thrust does, likewise.
     normal_mps2 : float or None

@@ -81,7 +81,7 @@ def advised_inputs(
     flown : iterable of (str, float)
         Surface and amplitude (rad) of each maneuver.
     period_s : mapping
-        Of the modes that were found.
+        Period of the modes that were found.
     """
     sizes: dict[str, list[float]] = {}
     for surface, size in flown:

@@ -53,7 +53,8 @@ def aircraft_document(
     source : str
         The aircraft they were made with: a name or a file.
     condition : MeanCondition, optional
-        Of a direct fit of coefficients: gives the drag polar and the range of angles of attack.
+        Condition of a direct fit of coefficients: gives the drag polar and the range of angles of
+        attack.
 
     Raises
     ------

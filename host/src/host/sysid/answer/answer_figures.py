@@ -58,7 +58,7 @@ def draw_all(
     answers : sequence of Answer
     direct : CoefficientAnswer or None
     verdicts : sequence of Verdict
-        Of all, linear ones first.
+        Verdicts of all answers, linear ones first.
     flights : sequence of mapping
         Columns of what the coefficients were made of; surfaces give the spectrum of the inputs.
     truth : dict, optional

@@ -40,7 +40,7 @@ class AnswerSummary:
     linear : tuple of Answer
     direct : CoefficientAnswer or None
     verdicts : tuple of Verdict
-        Of each, linear ones first.
+        Verdict of each answer, linear ones first.
     flown : tuple of DetectedManeuver
         In the flights, fitted or not.
     findings : tuple of Finding

@@ -49,11 +49,11 @@ class Opinion:
     theirs, ours : (f,) array, complex
         rad/s per unit of torque.
     half_width : (f,) array, complex
-        Of theirs, by the variances in the log: relative in magnitude, and of phase, rad.
+        Half-width of theirs, by the variances in the log: relative in magnitude, and of phase, rad.
     step_theirs, step_ours : float
         The rate `STEP_S` after a step of full torque, rad/s.
     airspeed_mps : float
-        Of the autotune.
+        Airspeed of the autotune.
     """
 
     tuned: TunedModel

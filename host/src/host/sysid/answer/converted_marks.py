@@ -22,7 +22,7 @@ def converted_marks(answer: Answer, marks: Mapping[str, str]) -> dict[str, str]:
     ----------
     answer : Answer
     marks : mapping
-        Of the derivatives, by `judge`; a coefficient whose derivative has none has none.
+        Marks of the derivatives, by `judge`; a coefficient whose derivative has none has none.
     """
     found, shares = {}, converted_shares(answer)
     for c in answer.coefficients:

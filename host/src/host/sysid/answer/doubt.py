@@ -25,7 +25,7 @@ class Evidence:
     Attributes
     ----------
     findings : tuple of Finding
-        Of the data checks.
+        Findings of the data checks.
     """
 
     findings: tuple[Finding, ...] = ()

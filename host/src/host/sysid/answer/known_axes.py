@@ -22,7 +22,7 @@ def known_axes(marks: Mapping[str, str]) -> dict[str, str]:
     Parameters
     ----------
     marks : mapping
-        Of derivatives or coefficients.
+        Marks of derivatives or coefficients.
 
     Returns
     -------

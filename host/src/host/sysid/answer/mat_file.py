@@ -27,7 +27,7 @@ def write_answers(path: Path, answers: Sequence[Answer], direct: CoefficientAnsw
     ----------
     path : Path
     answers : sequence of Answer
-        Of one model by several methods the method is in the structure's name.
+        Where one model has answers by several methods the method is in the structure's name.
     direct : CoefficientAnswer or None
         Becomes `coefficients` and its linear motion `coefficients_longitudinal`, `_lateral`.
     """

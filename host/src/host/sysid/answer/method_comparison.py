@@ -18,7 +18,7 @@ def method_table(answers: Sequence[Answer], width: int) -> list[str]:
     Parameters
     ----------
     answers : sequence of Answer
-        Of any models and methods.
+        Answers of any models and methods.
     width : int
         Characters of a line; methods that find no room follow below.
     """

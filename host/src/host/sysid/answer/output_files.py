@@ -151,13 +151,13 @@ def write_outputs(
     direct : CoefficientAnswer or None
         A direct fit of coefficients.
     verdicts : sequence of Verdict
-        Of all, linear ones first.
+        Verdicts of all answers, linear ones first.
     flights : sequence of mapping
         Columns of each, whose surfaces give the spectrum of the inputs.
     truth : dict or None
-        Of a simulated flight, for the pictures.
+        Truth of a simulated flight, for the pictures.
     findings : sequence of Finding
-        Of the data, for the pictures.
+        Findings of the data, for the pictures.
 
     Raises
     ------

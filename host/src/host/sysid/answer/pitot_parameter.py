@@ -27,7 +27,7 @@ def pitot_lines(
     ----------
     flights : sequence of ReconstructedFlight
     agreements : sequence of Compatibility or None
-        Of each.
+        Agreement of each flight.
     """
     lines = []
     for flight, found in zip(flights, agreements, strict=True):

@@ -84,9 +84,9 @@ def combined_estimate(c: Coefficient, expected: float, half: float) -> tuple[flo
     Parameters
     ----------
     c : Coefficient
-        Of the flight.
+        Coefficient of the flight.
     expected, half : float
-        Of the prior, which knows nothing of this flight.
+        Value and half-width of the prior, which knows nothing of this flight.
     """
     share = half**2 / (half**2 + c.half_width**2)  # of the flight
     return share * c.value + (1.0 - share) * expected, math.sqrt(share) * c.half_width

@@ -65,7 +65,7 @@ def write_form(
     source : str or None
         The aircraft that the answer was made with.
     condition : MeanCondition or None
-        Of a direct fit of coefficients.
+        Condition of a direct fit of coefficients.
 
     Raises
     ------

@@ -29,7 +29,8 @@ class SummaryRow:
     name, words : str
         Its symbol, and what it is called.
     value, half_width, share : float
-        Of the 95 % interval; over the value, or over what would contribute 5 % of its equation.
+        Value and half-width of the 95 % interval; the share is over the value, or over what would
+        contribute 5 % of its equation.
     unit : str
         SI and radian; empty of a pure number.
     mark, word : str

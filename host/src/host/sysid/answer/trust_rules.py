@@ -66,7 +66,7 @@ def input_feedback(view: EstimateView, evidence: Evidence) -> list[Doubt]:
 def impossible_sign(view: EstimateView, evidence: Evidence) -> list[Doubt]:
     """Doubt a sign that no aircraft has, its row, and what correlates with it.
 
-    Of a user's own model only the bounds speak.
+    A user's own model is doubted by its bounds alone.
     """
     impossible = {
         name: f"its sign is impossible: {POSSIBLE[name][1]}"

@@ -41,7 +41,7 @@ def judge(
     coefficients : CoefficientAnswer, optional
         Fitted directly.
     findings : sequence of Finding
-        Of the data checks.
+        Findings of the data checks.
     """
     evidence = Evidence(tuple(findings))
     views = views_of(linear, coefficients)
@@ -57,11 +57,11 @@ def verdict(
     Parameters
     ----------
     view : EstimateView
-        Of the answer.
+        View of the answer.
     doubts : sequence of Doubt
         All there are.
     findings : sequence of Finding
-        Of the data checks.
+        Findings of the data checks.
     """
     judged, marks = _doubted(view, doubts), _marks(view, doubts)
     lines = [

@@ -166,7 +166,7 @@ def shared_factor(tests: Sequence[tuple[DrivenTest, str]], tried: Iterable[float
     Parameters
     ----------
     tests : sequence of (DrivenTest, str)
-        Of identities, and the part of each that has the factor.
+        Tests of identities, and the part of each that has the factor.
     tried : iterable of float
         Factors that it may be.
     """

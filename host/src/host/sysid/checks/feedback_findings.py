@@ -40,8 +40,8 @@ LABEL = {
     "alpha_rad": "alpha", "beta_rad": "beta", "p_radps": "p", "q_radps": "q", "r_radps": "r",
 }  # fmt: skip
 CAUSES = {"rudder_rad": ("a yaw damper", "an autopilot"), "": ("an autopilot", "a stabiliser")}
-# Of all windows: several times the memory of a law (a delay of 0.4 s, a lag of 0.3 s). In 2.5 s of
-# hand flying a stick is a function of some state by chance.
+# Least length of all windows: several times the memory of a law (a delay of 0.4 s, a lag of 0.3 s).
+# In 2.5 s of hand flying a stick is a function of some state by chance.
 LEAST_S = 4.0
 LEAST_LAG_S = 0.05  # a shorter one looks like a delay
 

@@ -44,11 +44,12 @@ class Identity:
     sensors : tuple of arrays
         What right sensors may add by their tilt and zero, one deviation, (steps,) each.
     delays_s : dict
-        Of what, by its name ("" the column that changes), one deviation of a right sensor's delay.
+        One deviation of a right sensor's delay, by the name of what is late ("" the column that
+        changes).
     step_s : float
         Time between two steps.
     explained_share : float
-        Of the column's motion, that the parts must account for.
+        Share of the column's motion that the parts must account for.
     """
 
     name: str

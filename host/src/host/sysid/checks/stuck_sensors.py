@@ -38,7 +38,7 @@ def stuck_runs(
     name : str
         The sensor.
     step : float
-        Of its numbers; 0 where none is seen.
+        Step of its numbers; 0 where none is seen.
     longest_s : float
         It may stand still for as long.
     """

@@ -70,7 +70,7 @@ class MeanCondition:
     Attributes
     ----------
     airspeed_mps, qbar_pa : float
-        Of all maneuvers.
+        Means of all maneuvers.
     alpha_rad, lift, drag : float
         Angle of attack, CL and CD of the longitudinal maneuvers.
     thrust_effect : ThrustEffect
@@ -117,21 +117,21 @@ class CoefficientFit:
     ----------
     derivatives : tuple of Derivative
     covariance : Array, shape (derivatives + errors, derivatives + errors)
-        Of all derivatives, and behind them all sensor errors.
+        Covariance of all derivatives, and behind them all sensor errors.
     errors : dict
         Sensor error to its estimate and standard deviation.
     condition : MeanCondition
     histories : dict
         The force and moment coefficients in time.
     prediction : CrossValidation or None
-        Of single maneuvers by all others, in the last step.
+        Prediction of single maneuvers by all others, in the last step.
     maneuver_agreement : ManeuverAgreement
         Scatter of the maneuvers about the joint estimate, in the last step.
     error_sources : tuple of ErrorSource
         Each sensor error before the flight; empty of several flights.
     error_shifts : dict of str to (derivatives,) Array
-        Of the derivatives by one standard deviation of each error of sensors and of the drawing;
-        empty of several flights. Noise is not in it, as it is in `covariance`.
+        Shift of the derivatives by one standard deviation of each error of sensors and of the
+        drawing; empty of several flights. Noise is not in it, as it is in `covariance`.
     """
 
     derivatives: tuple[Derivative, ...]

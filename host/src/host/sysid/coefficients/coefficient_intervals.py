@@ -66,7 +66,7 @@ class SearchResult:
         Derivatives of `mean_levels` by the sensor errors.
     final : FinalStep
     error_shifts : Array, shape (n, errors)
-        Of all unknowns by one standard deviation of each sensor error.
+        Shift of all unknowns by one standard deviation of each sensor error.
     moved_from_least_squares : Array, shape (coefficients,)
         How far instrumental variables moved each estimate from that of least squares: next to
         nothing where air neither pitches nor rolls.
@@ -87,7 +87,10 @@ class SearchResult:
 
     @property
     def covariance(self) -> Array:
-        """Of all unknowns, (n, n); a share of what instrumental variables moved much counts."""
+        """Covariance of all unknowns, (n, n).
+
+        A share of what instrumental variables moved much counts.
+        """
         own = self.final.solution.covariance
         if not self.least_squares_shares:
             return own
@@ -123,9 +126,9 @@ def derivatives_of(
     state : Array, shape (n,)
         All unknowns, sensor errors last.
     level_slopes : Array, shape (3, errors), optional
-        Of `mean_levels`; without them CL and CD count as exact.
+        Slopes of `mean_levels`; without them CL and CD count as exact.
     nuisance : bool
-        Of nuisance terms too.
+        Return derivatives of nuisance terms too.
     """
     _, drag, lift = mean_levels(problem, data)
     slopes = np.zeros((3, len(state)))
@@ -150,7 +153,8 @@ class CoefficientIntervals:
     maneuver_agreement : ManeuverAgreement
         Scatter of the maneuvers about the joint estimate.
     error_shifts : dict of str to (derivatives,) Array
-        Of the derivatives by one standard deviation of each error of sensors and of the drawing.
+        Shift of the derivatives by one standard deviation of each error of sensors and of the
+        drawing.
     """
 
     state: Array

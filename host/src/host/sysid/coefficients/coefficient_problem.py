@@ -214,7 +214,7 @@ def sensor_error_slopes(
     slopes : dict
         By equation and window, (F, errors).
     level_slopes : Array, shape (3, errors)
-        Of `mean_levels`.
+        Slopes of `mean_levels`.
     """
     start = {k: v[:, 0] - v[:, 1:] @ coefficients[k[0]] for k, v in base.spectra.items()}
     count = len(problem.sources)
@@ -253,7 +253,7 @@ def flight_problem(
         Its even grid, s.
     windows : sequence of Window
     airframe, sensors, powerplant
-        Of the aircraft file.
+        Numbers of the aircraft file.
     sources : tuple of ErrorSource
         Sensor errors to estimate or to consider.
     """

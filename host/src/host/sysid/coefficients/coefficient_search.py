@@ -83,7 +83,7 @@ def search_coefficients(
     windows : sequence of Window
         Maneuvers; of every axis that the model has equations of (`flight_terms`).
     airframe, sensors, powerplant
-        Of the aircraft file.
+        Numbers of the aircraft file.
     model : CoefficientModel, optional
         The terms of every coefficient; `standard_model` by default.
     assumed : mapping, optional

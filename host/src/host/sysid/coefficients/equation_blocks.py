@@ -146,9 +146,9 @@ def equation_blocks(
     ----------
     windows : sequence of WindowTransform
     measured : EquationSpectra
-        Of the flight; it gives regressors and residuals.
+        Spectra of the flight; they give regressors and residuals.
     noise_free : EquationSpectra
-        Of the gust-free simulation; it gives the instrumental variables.
+        Spectra of the gust-free simulation; they give the instrumental variables.
     coefficients : mapping
         Estimate so far, by equation.
     unknowns : Unknowns

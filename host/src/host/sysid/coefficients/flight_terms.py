@@ -62,7 +62,7 @@ def flight_terms(
     windows : sequence of Window
         Maneuvers to be fitted.
     powerplant : Powerplant
-        Of the aircraft file.
+        Powerplant of the aircraft file.
 
     Raises
     ------

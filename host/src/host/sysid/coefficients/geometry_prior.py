@@ -51,8 +51,8 @@ def apply_geometry_prior(
         The product of all I - K H: the derivative of the updated estimate by that of the flight
         alone.
     shifts : dict of str to (n,) Array
-        Of the updated estimate by one standard deviation of each relation: by as much the drawing
-        may be wrong, in every flight alike.
+        Shift of the updated estimate by one standard deviation of each relation: by as much the
+        drawing may be wrong, in every flight alike.
     """
     a = airframe
     chord, span = a.chord_m, a.span_m

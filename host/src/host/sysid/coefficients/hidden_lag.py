@@ -37,9 +37,9 @@ def lagging_moments(
     Parameters
     ----------
     searches : sequence of SearchResult
-        Of each flight: one that shows it is enough.
+        Search of each flight: one that shows it is enough.
     derivatives : sequence of Derivative
-        Of all.
+        Derivatives of all flights.
     """
     half = {d.name: d.half_width for d in derivatives}
     significant = {d.name: d.value for d in derivatives if abs(d.value) > d.half_width}
@@ -89,7 +89,7 @@ def _term_columns(blocks: Sequence[EquationBlock], count: int) -> tuple[Array, A
 def _late(slopes: Array, deviation: Array, freedom: int) -> bool:
     """Return whether a surface comes later than its column, by a one-sided test of all.
 
-    Of a surface that comes later its slope has the other sign.
+    The slope of a surface that comes later has the other sign.
     """
     largest = float(np.max(slopes / np.maximum(deviation, 1e-300)))
     chance = len(slopes) * special.stdtr(freedom, -largest)

@@ -46,11 +46,11 @@ class GaussNewtonStep:
     ----------
     step : Array, shape (n,)
     covariance : Array, shape (n, n)
-        Of the estimate after the step, consider parameters included.
+        Covariance of the estimate after the step, consider parameters included.
     normal_matrix, right_side : Array, shapes (n, n) and (n,)
         ``normal_matrix @ step = right_side``, prior included.
     inverse : Array, shape (n, n)
-        Of the normal matrix.
+        Inverse of the normal matrix.
     """
 
     step: Array

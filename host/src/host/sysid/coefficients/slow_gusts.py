@@ -26,7 +26,7 @@ GRID = 30  # points of a maneuver at which the gust's covariance is formed
 # Maneuvers of two axes at one time meet the same gust: no covariance with an inverse says so. They
 # may differ by a thousandth of its standard deviation.
 OWN_SHARE = 1e-6
-# Of each kinematic equation: rate, sign, gust component. A slow side gust is negligible.
+# Gust terms of each kinematic equation: rate, sign, gust component. A slow side gust is negligible.
 GUST_TERMS = {
     "u": (("q", -1.0, "w"),),
     "v": (("p", 1.0, "w"), ("r", -1.0, "u")),

@@ -60,7 +60,7 @@ def derivatives_at_trim(
     position : mapping
     means : TrimMeans
     nuisance : bool
-        Of nuisance terms too.
+        Return derivatives of nuisance terms too.
 
     Returns
     -------

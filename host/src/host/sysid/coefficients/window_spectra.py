@@ -165,7 +165,8 @@ def residual_spectra(
     ----------
     windows : sequence of WindowTransform
     residuals : iterable
-        Of each block, (2 F,): real parts then imaginary ones, weighted by the spectra `before`.
+        Residuals of each block, (2 F,): real parts then imaginary ones, weighted by the spectra
+        `before`.
     before : mapping
         Frequency (Hz) and spectrum by equation.
 

@@ -38,7 +38,7 @@ def function_text(
     tables : mapping
         First place and number of points of each table in the array ``t``.
     arguments : sequence of str
-        Of the function.
+        Arguments of the function.
     """
     lines = [f"def {name}({', '.join(arguments)}):"]
     said: dict[int, str] = {}

@@ -33,7 +33,7 @@ def evaluate(
     target : int
         Node.
     values : mapping
-        Of the variables.
+        Values of the variables.
     tables : mapping, optional
         Points of x and y of each table.
 

@@ -39,9 +39,9 @@ class Node:
     arguments : tuple of int
         Nodes.
     value : float
-        Of a number.
+        Value of a number.
     name : str
-        Of a variable or table.
+        Name of a variable or table.
     """
 
     operation: str

@@ -15,7 +15,7 @@ def table_value(tables: Array, first: int, count: int, x: float) -> float:
     tables : Array
         All tables end to end: `count` points of x, as many of y.
     first, count : int
-        Of this table.
+        Place and number of points of this table.
     x : float
     """
     if x <= tables[first]:

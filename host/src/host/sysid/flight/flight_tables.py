@@ -120,9 +120,9 @@ def read_flight_columns(
     accept : collection of str
         Checks whose findings change nothing: the columns are used as they are.
     sensors : mapping of str to int, optional
-        Of an autopilot's log, the instance to use of a message, the surface that an output moves.
+        Instance to use of a message in an autopilot's log, or the surface that an output moves.
     row_rate_hz : float, optional
-        Of original rows, how many a second; estimated from GPS without it.
+        Rows a second of original rows; estimated from GPS without it.
 
     Raises
     ------

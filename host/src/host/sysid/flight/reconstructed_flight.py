@@ -34,8 +34,9 @@ if TYPE_CHECKING:
     from host.sysid.reconstruction.flow_angles import FlowAngles
     from host.sysid.reconstruction.reconstruction import Compatibility
 
-# Of our IMU's attitude: it takes acceleration for gravity and is 0.7 to 1.1 deg off, for one or two
-# seconds. A filter took it for a sensor without noise: on the card `demo` Cm_q was 2 % smaller.
+# Noise of our IMU's attitude: it takes acceleration for gravity and is 0.7 to 1.1 deg off, for one
+# or two seconds. A filter would take it for a sensor without noise, which makes Cm_q of the card
+# `demo` 2 % smaller.
 OWN_ATTITUDE_RAD = 0.017
 
 
@@ -63,17 +64,17 @@ class ReconstructedFlight:
     commands : mapping of (n,) Array
         Surfaces that no pot measured, as commanded; their columns are behind usual servos.
     servo : ServoPrior or None
-        Of these; None: not to be estimated.
+        Prior of the servos of these; None: not to be estimated.
     angles : FlowAngles or None
         Those that no vane measured, reconstructed: for products with airspeed and rates only.
     maker : str
         Who recorded it, as `Recording.maker` says: our logger, an autopilot, or others.
     errors : InstrumentErrors or None
-        Of its sensors, where a calibration says better than what is usual of the maker's.
+        Errors of its sensors, where a calibration says better than what is usual of the maker's.
     calibration_alone : Compatibility or None
-        Of sensors that came to no agreement: all that their calibration leaves open.
+        Check of sensors that came to no agreement: all that their calibration leaves open.
     by_default : Compatibility or None
-        Of an aircraft without a file: all that is open of sensors of which nothing is known.
+        Check without an aircraft file: all that is open of sensors of which nothing is known.
     record : tuple of ColumnChange
         What was done to `corrected`, and why.
     tuned : tuple of TunedModel
@@ -103,8 +104,8 @@ class ReconstructedFlight:
     def least_noise(self) -> dict[str, float]:
         """Least deviation of the noise of columns whose error lasts from sample to sample.
 
-        Of our own instrument where it is known: a delay of the vanes that is estimated with the
-        gust depends on pitch, and is lost without it (18 ms found as 0).
+        It has that of our own instrument where that is known: a delay of the vanes that is
+        estimated with the gust depends on pitch, and is lost without it (18 ms found as 0).
         """
         known = self.compatibility is not None and self.compatibility.instrument is not None
         return {"theta_rad": OWN_ATTITUDE_RAD} if known and self.maker == OWN else {}

@@ -32,7 +32,7 @@ def grade(columns: Mapping[str, Array], item: DetectedManeuver) -> Grade:
     if RESPONSE_OF[item.axis] not in columns:
         return Grade(0.0, 0.0, 0.0, 0.0, (f"no {RESPONSE_OF[item.axis]}: cannot be graded",))
     t = np.asarray(columns["t_s"], dtype=np.float64)
-    # Of a flight of an hour only this part is looked at.
+    # Only this part of a flight of an hour is looked at.
     near = slice(*np.searchsorted(t, (item.start_s - 2.0 * TRIM_S, item.end_s + TRIM_S)))
     t = t[near]
     response = np.nan_to_num(np.asarray(columns[RESPONSE_OF[item.axis]][near], dtype=np.float64))
@@ -40,7 +40,7 @@ def grade(columns: Mapping[str, Array], item: DetectedManeuver) -> Grade:
     inside = (t >= item.start_s) & (t <= item.end_s)
     before = (t >= item.start_s - TRIM_S) & (t < item.start_s)
     after = (t > item.input_end_s + 0.3) & (t <= item.end_s)
-    # Of the trim before: between slow rows, as a radio's, the motion itself turns.
+    # Noise of the trim before: between slow rows, as a radio's, the motion itself turns.
     # The second difference of white noise has six times its power: 1 + 4 + 1.
     still = before if before.sum() > FEWEST else inside
     noise = (
@@ -48,7 +48,7 @@ def grade(columns: Mapping[str, Array], item: DetectedManeuver) -> Grade:
     )
     power = float(np.std(response[inside])) if inside.any() else 0.0
     ratio = power / max(noise, 1e-12)
-    # Of a record that was cut to its input neither is known, and neither counts against it.
+    # Neither is known of a record that was cut to its input, and neither counts against it.
     trim = float(np.std(response[before])) / max(power, 1e-12) if before.sum() > 4 else 0.0
     feedback = (
         float(np.std(surface[after])) / max(item.amplitude, 1e-12) if after.sum() > 4 else 0.0

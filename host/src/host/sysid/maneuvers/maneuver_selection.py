@@ -143,7 +143,7 @@ def _given(
             edges=0,
             given=True,
         )
-        # Of a stretch at rest any surface may be the one: the fit will say what it tells.
+        # Any surface may be the one of a stretch at rest: the fit will say what it tells.
         for axis, size in (leading or {SURFACES[0]: 0.0}).items()
     ]
 

@@ -80,8 +80,8 @@ def _echo(item: DetectedManeuver, other: DetectedManeuver, columns: Mapping[str,
 def _follows_attitude(item: DetectedManeuver, columns: Mapping[str, Array]) -> bool:
     """Return whether a surface is moved as a hand that levels moves it.
 
-    Of 1 m/s of gusts the independent simulator's pilot has 0.81 to 0.995 of the elevator explained
-    so, doublets, pulses and 3-2-1-1s 0.5 at most.
+    The independent simulator's pilot has 0.81 to 0.995 of the elevator explained so in gusts of 1
+    m/s, doublets, pulses and 3-2-1-1s 0.5 at most.
     """
     if item.axis not in LEVELLING or LEVELLING[item.axis][0] not in columns:
         return False

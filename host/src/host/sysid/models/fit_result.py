@@ -31,7 +31,7 @@ class FitResult:
     covariance_white : Array, shape (P, P)
         Covariance if the residuals were white.
     degrees_of_freedom : Array, shape (P,)
-        Of the t distribution of each interval; infinite means normal.
+        Degrees of freedom of the t distribution of each interval; infinite means normal.
     residuals : tuple of Array
         Per maneuver (samples, columns): measured minus model, of the outputs or of the rates.
     fitted : tuple of Array
@@ -141,7 +141,7 @@ def without_parameters(
         Without them.
     names : collection of str
     known : Uncertainty, optional
-        Of all parameters, in place of that of the result.
+        Uncertainty of all parameters, in place of that of the result.
     """
     kept = [k for k, name in enumerate(result.names) if name not in names]
     if len(kept) == len(result.names):

@@ -23,7 +23,7 @@ STANDARD_DELAYS = (
     DelayGroup("delay_attitude_s", ("phi_rad", "theta_rad"), prior_sd_s=0.010, limit_s=0.03),
     DelayGroup("delay_pitot_s", ("airspeed_mps",), prior_sd_s=0.015, limit_s=0.05),
 )
-# Of others' vanes nobody removed any: 10 to 40 ms behind the gyro of the same row.
+# Vanes of others have a delay that nobody removed: 10 to 40 ms behind the gyro of the same row.
 OTHERS_DELAYS = (
     replace(STANDARD_DELAYS[0], prior_sd_s=0.020, limit_s=0.06),
     *STANDARD_DELAYS[1:],

@@ -112,7 +112,7 @@ class Uncertainty:
     ----------
     covariance : Array, shape (P, P)
     degrees_of_freedom : Array, shape (P,)
-        Of the t distribution of each interval; infinite means normal.
+        Degrees of freedom of the t distribution of each interval; infinite means normal.
     warnings : tuple of str
         One sentence for each reason to trust the estimate less.
     details : mapping

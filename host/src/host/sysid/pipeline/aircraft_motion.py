@@ -20,7 +20,7 @@ def aircraft_models(path: Path) -> list[tuple[str, LinearModel]]:
     Parameters
     ----------
     path : Path
-        Of an aircraft with coefficients.
+        File of an aircraft with coefficients.
 
     Raises
     ------

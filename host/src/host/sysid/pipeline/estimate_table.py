@@ -45,7 +45,7 @@ def estimate_table(
     linear : sequence of Answer
     direct : CoefficientAnswer or None
     verdicts : sequence of Verdict
-        Of each answer, linear ones first.
+        Verdict of each answer, linear ones first.
 
     Returns
     -------

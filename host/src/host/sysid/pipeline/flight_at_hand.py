@@ -36,13 +36,14 @@ class FlightAtHand:
     source : str
         What an answer calls it.
     how : ReadingOptions
-        Of it only what is asked of the columns counts: maneuvers, stretches, corrections, delays,
+        Only what is asked of the columns counts: maneuvers, stretches, corrections, delays,
         accepted findings, the calibration's deviations.
     known : AircraftData or None
     windows : tuple of DetectedManeuver or None
         Maneuvers to use in place of those that would be found.
     errors : InstrumentErrors or None
-        Of the sensors of an aircraft without a file, in place of what is usual of their maker.
+        Errors of the sensors of an aircraft without a file, in place of what is usual of their
+        maker.
     """
 
     read: FlightColumns
@@ -75,7 +76,7 @@ def at_hand(
     windows : sequence of DetectedManeuver, optional
         Maneuvers to use in place of those that would be found.
     errors : InstrumentErrors, optional
-        Of the sensors, without an aircraft file.
+        Errors of the sensors, without an aircraft file.
     corrections, delays : bool
         As in `host.identify`.
 

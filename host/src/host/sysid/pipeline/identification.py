@@ -52,7 +52,7 @@ class Identification:
     agreements : tuple of Compatibility or None
         Data-compatibility check of each flight.
     linear : tuple of Answer
-        Of linear models, one of each model and method.
+        Answers of linear models, one of each model and method.
     coefficients : CoefficientAnswer or None
         Fitted directly.
     notes : tuple of str

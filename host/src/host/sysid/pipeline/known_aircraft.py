@@ -29,7 +29,7 @@ class AircraftData:
     doubts : tuple of str
         Numbers of the file that no known aircraft has, one line each.
     calibration : Calibration or None
-        Of the instrument, if the user gave one.
+        Calibration of the instrument, if the user gave one.
     """
 
     source: str

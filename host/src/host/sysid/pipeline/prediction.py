@@ -114,7 +114,7 @@ def predict(
     Parameters
     ----------
     model : path
-        Of `host identify --save-model`, or a model file, whose start values are held; of
+        File of `host identify --save-model`, or a model file, whose start values are held; for
         coefficients the aircraft file, linearised at its trim.
     flights : path, FlightLog, DataFrame or list of them
     aircraft, calibration, mapping, maneuvers, stretches, from_s, to_s, corrections, accept, sensors

@@ -39,9 +39,9 @@ class ReadingOptions:
     accept : frozenset of str
         Checks whose findings change nothing.
     sensors : tuple of (message, instance)
-        Of an autopilot's log, which instance of a message is used.
+        Instance of a message that is used, in an autopilot's log.
     row_rate_hz : float, optional
-        Of original rows, how many a second.
+        Rows a second of original rows.
     """
 
     calibration: Path | None = None

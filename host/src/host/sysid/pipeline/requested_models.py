@@ -138,7 +138,7 @@ def possible_models(asked: Models, columns: Sequence[Collection[str]]) -> tuple[
     ----------
     asked : Models
     columns : sequence of collections of str
-        Of each flight.
+        Columns of each flight.
     """
     if asked.named:
         return asked, []

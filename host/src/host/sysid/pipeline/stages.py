@@ -101,14 +101,14 @@ def identify(
     accept : str or several
         Checks of the data whose findings shall change nothing: columns are used as they are.
     sensors : mapping of str to int, optional
-        Of an autopilot's log, the instance to use of a message: ``{"IMU": 1}``; and the surface
-        that an output moves: ``{"output 2": "elevator"}``.
+        Instance to use of a message in an autopilot's log: ``{"IMU": 1}``; and the surface that an
+        output moves: ``{"output 2": "elevator"}``.
     row_rate_hz : float, optional
-        Of original ASCII rows, which carry no time; estimated from GPS without it.
+        Rows a second of original ASCII rows, which carry no time; estimated from GPS without it.
     delays : bool
         Estimate residual delays and places of sensors of linear models where nothing gives them.
     truth : path or several, optional
-        Of simulated flights, one of each: compared with.
+        Truth of simulated flights, one of each: compared with.
     prior : path, optional
         Coefficients to compare with: TOML, AVL, Datcom.
     method_options : mapping, optional
@@ -178,7 +178,7 @@ def identify_columns(
     flights : FlightAtHand or several
         As `at_hand` or `read_flight` return them.
     truth : dict, optional
-        Of simulated flights, as `host simulate` writes it.
+        Truth of simulated flights, as `host simulate` writes it.
     models, methods, prior, method_options
         As in `host.identify`.
 

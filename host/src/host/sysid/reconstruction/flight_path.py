@@ -33,7 +33,7 @@ INERTIAL = (
 FLOW = ("alpha_scale", "alpha_zero_rad", "beta_scale", "beta_zero_rad")
 PITOT = ("pitot_scale", "pitot_zero_pa")
 DELAYS = ("vane_delay_s", "pitot_delay_s")
-# Of the beta vanes behind the alpha vanes; half of it on either side of the vanes' delay.
+# Delay of the beta vanes behind the alpha vanes; half of it on either side of the vanes' delay.
 DELAY_DIFFERENCE = "beta_delay_difference_s"
 PLACES = ("vane_x_m", "vane_z_m")  # errors of the vanes' position from the IMU
 WITH_GPS = ("gps_delay_s", "wind_north_mps", "wind_east_mps")
@@ -98,7 +98,7 @@ class PathProblem:
     ----------
     segments : sequence of Segment
     outputs : tuple of str
-        Of `AIR`, `HEIGHT` and `GPS`, in the order of `Segment.measured`.
+        Some of `AIR`, `HEIGHT` and `GPS`, in the order of `Segment.measured`.
     prior : dict
         Mean and standard deviation of every common unknown; those not in it are not free.
     start_sd : Array, shape (6,)

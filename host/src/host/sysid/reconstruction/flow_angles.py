@@ -69,7 +69,8 @@ class FlowAngles:
     alpha_sd_rad, beta_sd_rad : float
         Usual standard deviation of an instant.
     alpha_scale_sd, beta_scale_sd : float
-        Of the slopes of lift and side force, and so of the scale of what gusts and inputs do.
+        Deviations of the slopes of lift and side force, and so of the scale of what gusts and
+        inputs do.
     gust_rad : tuple of float
         Root mean square of the gusts' angles, alpha and beta.
     """

@@ -254,7 +254,7 @@ def _instruments(
 ) -> list[Array]:
     """Return the projection of whitened sensitivities on surfaces, slow drift and wind.
 
-    Of its remainder K / (N - K) is taken off: K of N dimensions are projected on.
+    Its remainder is reduced by K / (N - K): K of N dimensions are projected on.
     """
     common = len(problem.common)
     wind = [k for k, name in enumerate(problem.common) if name.startswith("wind_")]

@@ -248,8 +248,8 @@ def compensate_friction(
 def compensate_lowpass(signal: Array, i: SensorErrorModel, dt_s: float) -> Array:
     """Return an inertial signal with low-pass and interpolation inverted to second order.
 
-    Tables of others have neither: sharpened all the same, L_p and L_da were 10 % too large where
-    the air rolls.
+    Tables of others have neither: sharpened all the same, L_p and L_da would be 10 % too large
+    where the air rolls.
     """
     if i.recording.maker == FOREIGN:
         return signal

@@ -238,7 +238,7 @@ def by_calibration_alone(
     ----------
     instrument : SensorErrorModel
     found : Compatibility, optional
-        Of sensors at unknown places: the zeros of its gyros need none, and stand.
+        Agreement of sensors at unknown places: the zeros of its gyros need none, and stand.
     """
     known = {f.name: f for f in found.findings if f.data_informed} if found is not None else {}
     findings = (
@@ -290,7 +290,7 @@ def _with_imu_errors(
     estimate : tuple of float
         The zero and its deviation where the IMU has no error.
     sd : float
-        Of the zero by its calibration.
+        Deviation of the zero by its calibration.
     priors : mapping
         Mean and deviation of every error.
     """

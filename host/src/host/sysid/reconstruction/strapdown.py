@@ -158,9 +158,9 @@ def path_sensitivities(
     Array, shape (blocks, 3, width)
         Sensitivities of the velocity over the ground.
     Array, shape (blocks, width)
-        Of the distance downwards, m.
+        Sensitivities of the distance downwards, m.
     Array, shape (blocks, 3, width)
-        Of the velocity relative to the air, body axes.
+        Sensitivities of the velocity relative to the air, body axes.
     """
     axes = np.arange(3)
     attitude_error = _integral_to_middle(

@@ -41,11 +41,11 @@ def excess_over_noise_model(
     Parameters
     ----------
     free : FreeResponses
-        Of the model as fitted, without gust states, to the maneuvers fitted.
+        Responses of the model as fitted, without gust states, to the maneuvers fitted.
     result : FitResult
-        Of filter error; of other methods nothing is returned.
+        Fit of filter error; nothing is returned for other methods.
     airspeed_mps : float
-        Of the trim, for the gust's time scale.
+        Airspeed at trim, for the gust's time scale.
 
     1 % of right models name any output.
     """
@@ -123,7 +123,7 @@ def random_errors(
     estimate : Array
         Its first entries are the parameters of the model.
     result : FitResult
-        Of filter error, whose noise it is.
+        Fit of filter error, whose noise it is.
     maneuver : Maneuver
         Gives how long, and at which samples each output is measured.
     block : int

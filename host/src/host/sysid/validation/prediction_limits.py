@@ -85,13 +85,13 @@ def predictions(
     known : Uncertainty
         What is not known of it, every error in it.
     noise : InputCoherence or None
-        Of the maneuvers that were fitted.
+        Coherence of the maneuvers that were fitted.
     maneuvers : sequence of Maneuver
         Unseen.
     simulated : sequence of Array, shape (samples, p)
         Their free simulation.
     airspeed_mps : float, optional
-        Of the trim, for the time scale of a template's gusts. Without it they are not drawn.
+        Airspeed at trim, for the time scale of a template's gusts. Without it they are not drawn.
     """
     if noise is None or not maneuvers:
         return {}

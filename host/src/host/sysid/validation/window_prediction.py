@@ -68,10 +68,12 @@ def window_errors(
         Without free parameters and delays.
     maneuvers : sequence of Maneuver
     columns : sequence of mapping of (samples,) Array
-        Of each maneuver: rates and attitude for the persistence; what is missing counts as zero.
+        Columns of each maneuver: rates and attitude for the persistence; what is missing counts as
+        zero.
     biases : sequence of Biases
     states : sequence of Array, shape (samples, n)
-        Of the free simulation, for those that are no output: the bank angle of a lateral model.
+        States of the free simulation, for those that are no output: the bank angle of a lateral
+        model.
     length_s : float or None
         None is one sample: the one-step prediction.
     """
