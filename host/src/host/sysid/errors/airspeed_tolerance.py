@@ -37,7 +37,7 @@ def airspeed_shift(
     Parameters
     ----------
     result : FitResult
-        Of a template about `trim`.
+        Fit of a template about `trim`.
     maneuvers : sequence of Maneuver
         As fitted.
     trim : Trim

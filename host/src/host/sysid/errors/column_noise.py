@@ -31,7 +31,7 @@ def column_noise(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim) -
     Parameters
     ----------
     result : FitResult
-        Of other methods, and of models without columns, nothing is added.
+        Results of other methods, and of models without columns, get nothing added.
     maneuvers : sequence of Maneuver
         That were fitted.
     trim : Trim

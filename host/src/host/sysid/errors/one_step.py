@@ -63,11 +63,11 @@ class OneStep:
     reference : list of Array
         The same at the answer.
     slopes : list of Array, each (samples p, own)
-        Of the residuals by the unknowns of each maneuver.
+        Slopes of the residuals by the unknowns of each maneuver.
     columns : list of IntArray, each (own,)
         Where those stand among all unknowns.
     inverse : Array, shape (T, T)
-        Of the information on all unknowns.
+        Inverse of the information on all unknowns.
     source, target : IntArray
         Which unknown is which entry of the estimate.
     length : int
@@ -109,7 +109,7 @@ class OneStep:
         extended : sequence of (LinearModel, sequence of Maneuver)
             Model and data with each of them at one; the residuals must be linear in them.
         prior_sd : sequence of float
-            Of each, about zero.
+            Prior deviation of each, about zero.
         """
         count = len(extended)
         none = np.zeros((count, self.length))
@@ -176,8 +176,9 @@ class OneStep:
         """Return by how much the intervals of a result are wider than white noise makes them: the
         most of all, at least one.
 
-        Of parameters that nothing tells apart rounding made both variances. Where two of them said
-        a factor of 980 000, what lies between samples widened Cm_q from 1 to 34 per cent.
+        Both variances of parameters that nothing tells apart are made by rounding. Two of them may
+        say a factor of 980 000, and what lies between samples would widen Cm_q from 1 to 34 per
+        cent.
         """
         bare, information = np.zeros(self.length), np.zeros(self.length)
         bare[self.target] = np.diag(self.inverse)[self.source]

@@ -30,8 +30,8 @@ from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
 from host.sysid.numerics.between_samples import OTHER_HOLD
 
-# Of what kinks do to the estimate, one deviation: a servo of second order and 60 rad/s has none,
-# and passes for one of first order that does half as much.
+# Share of what kinks do to the estimate, one deviation: a servo of second order and 60 rad/s has
+# none, and passes for one of first order that does half as much.
 KINK_SHARE = 0.5
 LINES, SERVOS, HELD = "on lines", "as servos do", "held"
 HELD_SURFACES = "surfaces were held from sample to sample, as the outputs show"
@@ -70,7 +70,7 @@ def between_samples(
     Returns
     -------
     str
-        Of `LINES`, `SERVOS`, `HELD`.
+        One of `LINES`, `SERVOS`, `HELD`.
     """
     if surfaces_known(used):
         return SERVOS
@@ -104,8 +104,8 @@ def motion_shift(
 ) -> tuple[ShiftedEstimate, ...]:
     """Return the estimate moved by what the motion between samples leaves open, one deviation each.
 
-    Of surfaces that move it is a share of what kinks do. Of those on lines it is how far the data
-    let them move, with a delay.
+    It is a share of what kinks do where surfaces move. Where they are on lines it is how far the
+    data let them move, with a delay.
 
     Parameters
     ----------

@@ -41,8 +41,9 @@ from host.sysid.reconstruction.sensor_corrections import (
 from host.sysid.reconstruction.sensor_dynamics import perturb_columns, residual_errors
 
 RECONSTRUCTED = "reconstruction of this flight"  # that left less of an error than files state
-# Of the dynamic pressure, most that a pitot's zero is moved by at once: one that nobody zeroed is
-# off by more than all of it, and no airspeed would be left. A larger one counts in proportion.
+# Most that a pitot's zero is moved by at once, as a share of the dynamic pressure: one that nobody
+# zeroed is off by more than all of it, and no airspeed would be left. A larger one counts in
+# proportion.
 MOST_PRESSURE = 0.2
 PITOT_ZERO = PITOT[1]
 TRIMMING = ("airspeed_mps", "alpha_rad", "theta_rad", "qbar_pa", "density_kgpm3")
@@ -66,8 +67,8 @@ def systematic_error_shifts(
     cuts : sequence of mapping
         All columns of each maneuver.
     known : sequence of Compatibility
-        Of the flight of each maneuver. An error is one of all flights, in each of them by its own
-        deviation there: what is new at every power-on counts as if it were not.
+        Agreement of the flight of each maneuver. An error is one of all flights, in each of them by
+        its own deviation there: what is new at every power-on counts as if it were not.
     trim : Trim
 
     Returns
@@ -142,7 +143,7 @@ def systematic_residuals(
     Parameters
     ----------
     problem : OutputProblem
-        Of the maneuvers.
+        Problem of the maneuvers.
     theta : Array
     cuts, known, trim
         As `systematic_error_shifts`.
@@ -150,7 +151,8 @@ def systematic_residuals(
     Returns
     -------
     list of Array, shape (p, samples, errors)
-        Of each maneuver; those that change nothing, or with which the model diverges, are left out.
+        Shifts of each maneuver; those that change nothing, or with which the model diverges, are
+        left out.
     """
     outputs = problem.outputs(theta)
     if outputs is None:
@@ -242,9 +244,9 @@ def errors_left_open(known: Compatibility, columns: Mapping[str, Array]) -> tupl
     Parameters
     ----------
     known : Compatibility
-        Of the flight.
+        Agreement of the flight.
     columns : mapping
-        Of a maneuver: the delay of vanes by an aircraft file depends on its airspeed.
+        Columns of a maneuver: the delay of vanes by an aircraft file depends on its airspeed.
     """
     left = {e: sd for e, sd in residual_deviations(known).items() if e in INSTANTANEOUS_ERRORS}
     sizes = left | residual_errors(known, columns)

@@ -50,7 +50,7 @@ LATERAL, TORQUE = "lateral", "L_V"
 SHARED = ("L_beta", "L_r", "N_p")  # by wing and fin; N_beta is the fin's
 LIFT_ACTS = "derivatives that follow lift, and the torque of the propeller"
 LEFT_OUT = "motion that the model leaves out"
-# Of D_alpha_alpha over V Z_alpha, which is 2 C_D_CL2 C_L_alpha of a parabolic polar: 0.3 to 1.
+# Most of D_alpha_alpha over V Z_alpha, which is 2 C_D_CL2 C_L_alpha of a parabolic polar: 0.3 to 1.
 LARGEST_CURVATURE = 3.0
 NO_SPIN = (0.0, 0.0)
 LOOSE_SHARE = 10.0  # of the departures, one deviation
@@ -76,7 +76,7 @@ class _Departing:
     thrust : dict
         What thrust is expected to do.
     second_order : dict
-        Of each term of the drag polar, or that follows lift or airspeed, what is expected, and one
+        What is expected of each term of the drag polar, or that follows lift or airspeed, and one
         deviation.
     """
 
@@ -155,7 +155,7 @@ def correct_trim_departure(
         Inertia; without, what body rates do to each other is left out.
     trim : Trim
     spin : tuple
-        Of the rotor (`spin_of`), which joins pitch and yaw.
+        Angular momentum of the rotor (`spin_of`), which joins pitch and yaw.
     fitted : sequence of Maneuver, optional
         What the result was fitted to, if departures had been removed from it; the shift is then
         what the removal left.
@@ -244,9 +244,9 @@ def _linear(
 ) -> bool:
     """Return whether the record has no departures, as a linear simulator's.
 
-    Of columns that nobody measured they are a guess. How much of them is there is one more
-    parameter: of a linear lateral record in white noise what they added was not there, and the
-    test of coherence widened L_p 2.6 times.
+    Departures of columns that nobody measured are a guess. How much of them is there is one more
+    parameter: what they add is not there in a linear lateral record in white noise, and the test of
+    coherence widens L_p 2.6 times by it.
     """
     whole = (departing.model({}), departing.data)
     share, sd = one_step.share_of(whole, result, departing.trim, maneuvers, LOOSE_SHARE)
@@ -257,8 +257,8 @@ def _needed(model: LinearModel) -> tuple[str, ...]:
     """Return the columns without which departures of a model rest on a guess.
 
     A side force matters only as an output. What else accelerometers say turns sideslip by the load
-    factor alone: of a light aircraft without ay N_da was 24 % off, known to 6, when nothing was
-    taken out.
+    factor alone: without ay N_da of a light aircraft is 24 % off, known to 6, if nothing is taken
+    out.
     """
     still_known = MEASURED[-3:] if "beta_rad" in model.states else ("ay_mps2",)
     return tuple(c for c in MEASURED if c not in still_known)
@@ -287,10 +287,10 @@ def _root(covariance: Array) -> Array:
 def _polar(result: FitResult, trim: Trim, *, pitching: bool) -> dict[str, tuple[float, float]]:
     """Return what is expected of each term of the drag polar, and one deviation.
 
-    Left out, M_q was 1.8 % off in calm air, and the test of coherence named ax. Lift of pitching
-    drags by anything from nothing, where a tail makes it, to all that the polar has for it, evenly:
-    left out, CD_de is low by two to four half-widths where drag follows all lift. With measured
-    thrust, where the polar is fitted at once with it, it is not tried.
+    Left out, they move M_q by 1.8 % in calm air, and the test of coherence names ax. Lift of
+    pitching drags by anything from nothing, where a tail makes it, to all that the polar has for
+    it, evenly: left out, CD_de is low by two to four half-widths where drag follows all lift. With
+    measured thrust, where the polar is fitted at once with it, it is not tried.
     """
     if "ax_mps2" not in result.model.outputs or "D_alpha" not in result.names:
         return {}

@@ -30,7 +30,7 @@ def widest_errors(
     total : Uncertainty
         With the systematic errors.
     shifts : sequence of ShiftedEstimate
-        Of one deviation of each systematic error.
+        Shift by one deviation of each systematic error.
     """
     noise = np.diag(fit.covariance)
     parts = {NOISE: noise, OUTSIDE_MODEL: np.maximum(np.diag(statistical.covariance) - noise, 0.0)}

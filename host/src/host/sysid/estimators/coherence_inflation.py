@@ -60,7 +60,7 @@ def driven_by_inputs(
     noise : Uncertainty
         What noise leaves open of it.
     found : InputCoherence or None
-        Of its free simulation. None is returned without, or if no output is coherent.
+        Coherence of its free simulation. None is returned without, or if no output is coherent.
     excess : NoiseExcess, optional
         Outputs whose residual is larger than the fit's own noise and gust model predicts.
     """

@@ -27,11 +27,11 @@ from host.sysid.numerics.output_error_problem import OutputProblem
 
 # What else disturbs: thrust and longitudinal gusts; the drift of the attitude filter.
 OTHER_PROCESS_STATES = ("airspeed_mps", "phi_rad")
-# With every column held for five rows the delay of the IMU scattered by 0.5 ms in calm air, known
-# to 0.2 by the filter, and 47 of 54 intervals held: by output error all of them.
+# With every column held for five rows the delay of the IMU scatters by 0.5 ms in calm air, known
+# to 0.2 by the filter, and 47 of 54 intervals hold: by output error all of them.
 SLOW_IN_CALM = "the air is calm and every column slow; output error stands instead"
-# Without a force the filter takes what it thinks are gusts for the delay of the vane: of 20 ms
-# of a light aircraft it found 0 and 30, known to 6, by output error 13, known to 9.
+# Without a force the filter takes what it thinks are gusts for the delay of the vane: it finds 0
+# and 30 ms for 20 of a light aircraft, known to 6, and output error 13, known to 9.
 FORCELESS_IN_CALM = (
     "the air is calm and no accelerometer tells the vane's delay; output error stands instead"
 )
@@ -68,7 +68,7 @@ def fit_with_gust(
     maneuvers : sequence of Maneuver
         Data as measured.
     airspeed_mps : float
-        Of the trim, for the gust's time scale, m/s.
+        Airspeed at trim, for the gust's time scale, m/s.
     before : mapping of str to float, optional
         Estimates of such a fit without delays, to start from; by default those of output error.
     roughly : bool

@@ -46,7 +46,7 @@ class RecordedResponse:
     window_s : float
         One over the band that is averaged.
     windows : int
-        Of that length in all records: as many lines are averaged.
+        Windows of that length in all records: as many lines are averaged.
     """
 
     frequency_hz: Array
@@ -161,7 +161,7 @@ class ModelResponse:
 def model_response(result: FitResult, frequency_hz: Array, dt_s: float) -> ModelResponse:
     """Return the response of a fitted model as sampled, delays included, with its interval.
 
-    Of equations that a user wrote it is that of the tangent.
+    The response of equations that a user wrote is that of the tangent.
 
     Parameters
     ----------

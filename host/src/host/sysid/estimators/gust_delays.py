@@ -34,26 +34,26 @@ from host.sysid.numerics.output_error_problem import OutputProblem
 ROUNDS = 3
 PADE_STATES = 3
 SHORTEST_SHARE = 0.2  # of a sample: least delay that is left of a vane's, set back by one
-# Of a sample, one deviation: what a line between samples of a moving surface, and gusts of another
-# form, pass for. 0.2 to 0.6 ms of an IMU without any are found at 10 ms, known to 0.2. Given the
-# delay that the line makes of the surface parameters are right (M_q +0.2 % at -0.4 ms, 50 flights
-# in calm air, where 0.2 ms counted in full made its interval 1.6 times as wide): of them only
-# gusts count it.
+# One deviation of what a line between samples of a moving surface, and gusts of another form, pass
+# for, as a share of a sample: 0.2 to 0.6 ms of an IMU without any delay are found at 10 ms, known
+# to 0.2. Given the delay that the line makes of the surface parameters are right (M_q +0.2 % at
+# -0.4 ms, 50 flights in calm air, where 0.2 ms counted in full makes its interval 1.6 times as
+# wide): only gusts count it for them.
 HOLD_SHARE = 0.02
-# The same of a vane against them: what gusts do between samples. 0.1 to 0.2 ms were found in
-# Dryden's air and 0.3 to 0.5 in von Karman's of a vane without any, known to 0.17 at 10 ms (4 and
-# 8 flights of 1 m/s); M_alpha was 1.0 % large by half of it, known to 1.2 to 1.4.
+# The same of a vane against them: what gusts do between samples. 0.1 to 0.2 ms are found in
+# Dryden's air and 0.3 to 0.5 in von Karman's of a vane without any delay, known to 0.17 at 10 ms (4
+# and 8 flights of 1 m/s); half of it makes M_alpha 1.0 % large, known to 1.2 to 1.4.
 VANE_SHARE = 0.03
 CALM_MPS = 0.1  # deviation of gusts, well below which they pass for nothing
 SETTLED_SD = 0.3  # a round that moves a delay by less is the last
-# The pitot feels gusts along the path that the model has not: its delay went to 50 ms.
+# The pitot feels gusts along the path that the model has not: its delay goes to 50 ms.
 GUST_BLIND = ("airspeed_mps",)
 # Without the force that goes with a wind angle a vane's delay looks like a gust, and like the lift
-# of pitching, which the model lacks then: -15 to +11 ms were found of vanes without any, known to
-# 5, and M_q was 12 % off. What was known before stands.
+# of pitching, which the model lacks then: -15 to +11 ms are found of vanes without any delay, known
+# to 5, and M_q is 12 % off. What is known before stays.
 FORCES = ("ay_mps2", "az_mps2")
-# With the lift of pitching among the parameters gusts tell it, by what they are taken to be: of a
-# light aircraft 53 and 9 ms were found for 20, known to 4 and 3; ten other records held.
+# With the lift of pitching among the parameters gusts tell it, by what they are taken to be: 53 and
+# 9 ms are found for 20 of a light aircraft, known to 4 and 3; ten other records hold.
 GUST_FORM = 3.0
 
 
@@ -95,7 +95,7 @@ def estimate_delays(
         As measured.
     airspeed_mps : float
     first : FitResult
-        Of output error, with the delays.
+        Fit of output error, with the delays.
     start : Array, shape (P + constants,)
         Parameters and constants of every maneuver, without delays.
     process : tuple of str
@@ -221,11 +221,11 @@ def _with_delay_terms(
 ) -> LinearModel:
     """Return the model with delays as parameters, rates of the inputs as further inputs.
 
-    Of a vane in gusts there is no slope, for what it measures is driven by white noise. It comes a
-    sample later than it was measured (`_centred`), and its delay of that length is a Pade filter
-    of third order, y = -u + 240 z1 + 24 z3 with T dz1/dt = z2, T dz2/dt = z3 and T dz3/dt = u -
-    120 z1 - 60 z2 - 12 z3. The parameter is 1 / T, in which the model is linear (`_as_delays`).
-    The filter of second order is 7 % short at half the sampling rate: a vane seemed 0.9 ms late.
+    A vane in gusts has no slope, for what it measures is driven by white noise. It comes a sample
+    later than it was measured (`_centred`), and its delay of that length is a Pade filter of third
+    order, y = -u + 240 z1 + 24 z3 with T dz1/dt = z2, T dz2/dt = z3 and T dz3/dt = u - 120 z1 - 60
+    z2 - 12 z3. The parameter is 1 / T, in which the model is linear (`_as_delays`). The filter of
+    second order is 7 % short at half the sampling rate: a vane seems 0.9 ms late by it.
     """
     _, _, C, _ = wide.matrices(theta)
     n, count = len(wide.states), len(wide.inputs)
@@ -277,7 +277,7 @@ def _slope_terms(
 ) -> list[Term]:
     """Return what delays of outputs but the `late` ones do: minus the outputs' rates.
 
-    Of an output that sees the gust there is no rate by gust states.
+    An output that sees the gust has no rate by gust states.
     """
     A, B, C, D = wide.matrices(theta)
     by_state, by_input, count = C @ A, C @ B, len(wide.inputs)

@@ -40,7 +40,7 @@ def gust_model(
     base : LinearModel
         A template; alpha or beta must be a measured state of it.
     airspeed_mps : float
-        Of the trim, for the gust's time scale, m/s.
+        Airspeed at trim, for the gust's time scale, m/s.
     scale_m : float
         Scale length L of the gusts, m.
     span_m : float, optional
@@ -94,8 +94,8 @@ def gust_model(
         base,
         name=f"{base.name} with gust",
         states=states,
-        # The air rolls already where a record begins. Taken for still, it seemed quicker than it
-        # is: L_p was 5 % small in rolling air of 1 m/s. Of sideways air the start changed nothing.
+        # The air rolls already where a record begins. Taken for still, it seems quicker than it is,
+        # and L_p is 5 % small in rolling air of 1 m/s. The start of sideways air changes nothing.
         initial_states=(*base.initial_states, *((ROLL_GUST,) if rolls else ())),
         A=A,
         B=np.vstack([base.B, np.zeros((len(gust_states), len(base.inputs)))]),
@@ -165,9 +165,9 @@ def driven_model(model: LinearModel, process: Sequence[str], airspeed_mps: float
     model : LinearModel
         As fitted. A template has no gust state yet; a user's model has its own.
     process : sequence of str
-        Of `innovations.driven_states`.
+        States that `innovations.driven_states` names.
     airspeed_mps : float
-        Of the trim, m/s.
+        Airspeed at trim, m/s.
     """
     return model if set(process) <= set(model.states) else gust_model(model, airspeed_mps)
 

@@ -2,10 +2,10 @@
 
 How strongly is not known beforehand: a small aircraft in long gusts feels the angle alone, one of
 which the tail makes most of the damping feels both, and shape and length of the gusts differ. Left
-out, M_alpha was 55 % and M_q 160 % off on simulated flights in which the air turns, taken for known
-(MIL-F-8785C, 3.7.5) they were 15 to 40 % off where it does not; free, both are within 2 %.
-Sideslip and yaw rate alike: left out, L_beta was 29 and N_r 21 % off. Lateral gusts also roll the
-air, with a lag of their own.
+out, turning air puts M_alpha 55 % and M_q 160 % off on simulated flights; taken for known where it
+does not turn (MIL-F-8785C, 3.7.5), 15 to 40 %; free, both are within 2 %. Sideslip and yaw rate
+alike: left out, L_beta is 29 and N_r 21 % off. Lateral gusts also roll the air, with a lag of their
+own.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def with_gust_penetration(
     model : LinearModel
         Without delays.
     airspeed_mps : float
-        Of the trim.
+        Airspeed at trim.
     start : Array, shape (P,)
         Common parameters of the model first.
     """

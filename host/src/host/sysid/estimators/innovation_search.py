@@ -38,7 +38,7 @@ def first_noise(A: Array, C: Array, driven: Sequence[int], deviation: Array) -> 
     driven : sequence of int
         States that process noise drives.
     deviation : Array, shape (p,)
-        Of the residuals of output error.
+        Deviation of the residuals of output error.
     """
     process = []
     for i in driven:
@@ -78,7 +78,7 @@ class InnovationObjective(Objective[InnovationLikelihood]):
     ----------
     problem : InnovationProblem
     floor : Array
-        Of the logarithms of the deviations.
+        Least logarithms of the deviations.
     """
 
     def __init__(self, problem: InnovationProblem, floor: Array) -> None:

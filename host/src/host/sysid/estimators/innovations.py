@@ -43,7 +43,7 @@ class Innovations:
     sampled : list of Array or None, each (samples, p)
         At which samples each output was measured; None: at all.
     sensitivities : list of Array, each (samples, p, P)
-        Of the whitened innovations.
+        Sensitivities of the whitened innovations.
     """
 
     theta: Array
@@ -164,7 +164,7 @@ def hac_inflation(
     steps_s : sequence of float
         Sample period of each maneuver.
     inverse : Array, shape (P, P)
-        Of the whole information.
+        Inverse of the whole information.
     """
     hac_variance, score_variance = np.zeros(len(inverse)), np.zeros(len(inverse))
     record_s = sum(len(e) * dt_s for e, dt_s in zip(white, steps_s, strict=True))

@@ -152,7 +152,7 @@ def fit_jointly(
     Parameters
     ----------
     name : str
-        Of the filter.
+        Name of the filter.
     filter_pass : callable
         Filters one maneuver: given the filter, the maneuver, joint state and covariance it returns
         both behind the last sample, and the innovations, in units and whitened, (samples, p).
@@ -235,7 +235,7 @@ def filter_result(
         Model, names, estimate (n,), covariance for white innovations (n, n).
     maneuvers : sequence of Maneuver
     innovations : tuple of sequences of Array
-        Of each maneuver: in the units of the outputs and whitened, (samples, p).
+        Innovations of each maneuver: in the units of the outputs and whitened, (samples, p).
     details : mapping
     """
     model, names, estimate, covariance = estimated

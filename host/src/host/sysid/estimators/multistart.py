@@ -47,8 +47,8 @@ def multistart(
 ) -> Optimum:
     """Return the best optimum of white-noise output error found from `theta` and other starts.
 
-    Of equations of a user it is the one that is reached from `theta`, or next to it by the delay of
-    a control.
+    For equations of a user it is the one that is reached from `theta`, or next to it by the delay
+    of a control.
 
     Parameters
     ----------
@@ -109,8 +109,8 @@ def _with_other_delays(problem: OutputProblem, best: Optimum) -> Optimum:
     """Return the best optimum whose controls are samples earlier or later than those of `best`.
 
     Each whole sample bends the cost over a delay, and a quicker servo makes up for a part of it.
-    Of records of 20 and 40 ms a sample a servo 40 ms late was found 20 ms late, with a bandwidth of
-    70 rad/s in place of 22.
+    In records of 20 and 40 ms a sample a servo 40 ms late is found 20 ms late otherwise, with a
+    bandwidth of 70 rad/s in place of 22.
     """
     controls = {*problem.model.controls()}
     late = [d.name for d in problem.model.delays if controls & {*d.outputs}]

@@ -31,7 +31,7 @@ def compare_noise_models(
     Parameters
     ----------
     result : FitResult
-        Of filter error, its cost in `details`.
+        Fit of filter error, its cost in `details`.
     maneuvers : sequence of Maneuver
         What it was fitted to.
     start : Array
@@ -79,7 +79,7 @@ def bayes_criterion(result: FitResult, maneuvers: Sequence[Maneuver]) -> float:
     Parameters
     ----------
     result : FitResult
-        Of output error or filter error.
+        Fit of output error or filter error.
     maneuvers : sequence of Maneuver
         What it was fitted to.
     """

@@ -127,7 +127,7 @@ def refit_without_driven(
     problem : OutputProblem
     fit : ArNoiseFit
     highest_order : int
-        Of the AR models.
+        Highest order of the AR models.
     """
     found = input_coherence(problem, fit.optimum.responses, fit.optimum.theta)
     if not found.coherent or all(n.order == 0 for n in fit.noise):

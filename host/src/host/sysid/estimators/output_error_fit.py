@@ -182,7 +182,7 @@ def coloured_output_covariance(problem: OutputProblem, fit: ArNoiseFit) -> Array
     white = fit.covariance_white
     # What a prior tells is as uncertain as the prior: data say nothing along its direction.
     score_covariance = np.diag(problem.prior_precision)
-    # Of a clean column and of a coarse step the residuals do not show the noise that counts.
+    # Residuals of a clean column and of a coarse step do not show the noise that counts.
     squares = np.sum([np.sum(r**2, axis=1) for r in fit.optimum.residuals], axis=0)
     unidentifiable = np.where(
         fit.optimum.variance <= problem.least_variance,

@@ -79,7 +79,7 @@ def fit_recursive_least_squares(
         Weight of the past per sample, above 0 and at most 1; intervals are as wide as what it
         leaves.
     bandwidth : float, optional
-        Of the differentiation, Hz.
+        Bandwidth of the differentiation, Hz.
     """
     if not 0.0 < forgetting <= 1.0:
         raise IdentificationError(f"forgetting {forgetting}, expected above 0 and at most 1")

@@ -18,7 +18,7 @@ from host.sysid.numerics.input_coherence import block_length, block_means
 
 LEAST, MOST = (-0.15, 0.3, 0.2), (0.5, 60.0, 60.0)  # a delay, a bandwidth, a rate that can be
 SCAN_S = np.arange(-0.08, 0.241, 0.04)
-# Of the noise of output error: its memory, in means over this long; and what a model lacks at any
+# Noise of output error: its memory, in means over this long; and what a model lacks at any
 # frequency, over the motion: whitened, calm air's small errors of the model would tell the delay.
 AR_ORDER, AR_STEP_S, LACK = 8, 0.02, 0.02
 # The third argument is a fit behind servos not far from these, to start from, or None.
@@ -106,7 +106,7 @@ class CoarseDelays:
 def _cost(found: FitResult, data: Sequence[Maneuver]) -> float:
     """Return minus the logarithm of the likelihood of a fit, but for a constant.
 
-    Of output error in noise with a memory, estimated too; innovations are white.
+    Output error counts in noise with a memory, estimated too; innovations are white.
     """
     if found.residual_kind == "innovation":
         # What was not measured has no innovation, and zeros would pass for small ones in their

@@ -73,7 +73,7 @@ class ServoEstimate:
     covariance : Array, shape (P, P)
         What the uncertain servo adds to that of these.
     correlation : dict
-        Of each parameter with the servo.
+        Correlation of each parameter with the servo.
     rival_s : float or None
         A delay far from this one at which the method fits better: the search had another optimum.
     """

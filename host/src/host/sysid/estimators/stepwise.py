@@ -89,7 +89,7 @@ def fit_stepwise(
     f_in : float
         Partial F to enter and to stay.
     bandwidth : float, optional
-        Of the differentiation, Hz.
+        Bandwidth of the differentiation, Hz.
 
     Returns
     -------

@@ -22,9 +22,9 @@ from host.sysid.models.thrust_column import THRUST
 def fit_gust_at_trim(columns: PreparedColumns) -> LinearFit:
     """Fit with the gust as a state, departures from the trim removed at a first such fit.
 
-    One step behind the fit does not do: in calm air the IMU seemed 0.3 ms late by what the
-    drag polar does to ax, and M_q was 1.8 % off. Nor does output error in front of it: in
-    gusts of 1 m/s its M_alpha was up to six times too large.
+    One step behind the fit does not do: in calm air the IMU seems 0.3 ms late by what the drag
+    polar does to ax, and M_q is 1.8 % off. Nor does output error in front of it: in gusts of 1 m/s
+    its M_alpha is up to six times too large.
     """
     model, data, trim = columns.chosen.model, columns.data, columns.chosen.trim
     before, at_trim = _first_fit(columns)

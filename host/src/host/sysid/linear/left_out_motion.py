@@ -33,8 +33,8 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.residual_delays import advance_outputs
 from host.sysid.models.state_space_model import LinearModel
 
-# Of a term, from what is usual: gusts that turned both passed for it at 4 to 9, in calm air it was
-# at most 1.4.
+# Most deviations of a term from what is usual: gusts that turn the air pass for it at 4 to 9, in
+# calm air it is at most 1.4.
 LIKELY_SD = 2.0
 
 
@@ -58,15 +58,15 @@ def fit_with_left_out(
     Parameters
     ----------
     method : str
-        Of output error, or filter error with the gust: None where that does not converge.
+        Method of output error, or filter error with the gust: None where that does not converge.
     columns : PreparedColumns
     options : mapping
-        Of the method.
+        Options of the method.
     """
     chosen, data, cuts = columns.chosen, columns.data, columns.departing
     model, trim, airframe = chosen.model, chosen.trim, columns.airframe
     reduced = model.name in LEFT_OUT_TERMS
-    # Of thrust the gust filter of other templates takes care by itself (`gust_at_trim`).
+    # Thrust is taken care of by the gust filter of other templates itself (`gust_at_trim`).
     if not reduced and (method == GUST or not thrust_terms(model, cuts, trim, airframe)):
         return None
     rough = fit("output-error-white", replace(model, delays=()), data, multiple_starts=False)

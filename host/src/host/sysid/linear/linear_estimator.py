@@ -52,7 +52,7 @@ class LinearEstimator:
     named : bool
         The user asked for this model: a stretch given is a maneuver of it, whatever moved more.
     options : mapping
-        Of the method, as keyword arguments of its function.
+        Options of the method, as keyword arguments of its function.
     """
 
     template: str

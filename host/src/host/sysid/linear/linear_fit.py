@@ -35,7 +35,7 @@ def fit_columns(columns: PreparedColumns, options: Mapping[str, object]) -> Line
     ----------
     columns : PreparedColumns
     options : mapping
-        Of the method.
+        Options of the method.
 
     Raises
     ------

@@ -186,7 +186,7 @@ def _by_sensors(
     known = [c for c in carriers if c is not None]
     if len(known) < len(carriers):
         return ()
-    # Of servos that were estimated the covariance has what they leave open, and the IMU's delay
+    # Servos that were estimated leave what is open of them in the covariance, and the IMU's delay
     # with it: all outputs later are all inputs earlier.
     estimated = {SERVO_DELAY, IMU_DELAY} if e.columns.servo is not None else set()
     estimated |= DELAYED_COLUMNS.keys() if e.found.delays else set()

@@ -217,7 +217,7 @@ def _default_method(
     model: LinearModel, used: Sequence[FlownManeuver], trim: Trim
 ) -> tuple[str, str]:
     """Return what fits a template, and why it is not the gust filter where that was to be."""
-    # Of our own log laterally only where its sensors are known (`filter_step`).
+    # Our own log is filtered laterally only where its sensors are known (`filter_step`).
     rolls = feels_roll(model) and rolling_gust_identifiable(used)
     vane = "beta_rad" if rolls else "alpha_rad"
     if not (trim.known and vane in model.states and vane in model.outputs):

@@ -139,9 +139,9 @@ class LinearIntervals:
     errors : tuple of ErrorSource
         Errors that widen intervals; of several flights the largest deviation of each.
     total : Uncertainty
-        Of the estimate with all of these.
+        Uncertainty of the estimate with all of these.
     parts : CoefficientParts or None
-        Of the coefficients, mass and inertia in theirs.
+        Parts of the coefficients, mass and inertia in theirs.
     """
 
     statistical: FitResult

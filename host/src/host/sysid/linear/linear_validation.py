@@ -28,7 +28,7 @@ def linear_validation(
     """
     e, result, total = estimate, intervals.statistical, intervals.total
     model, maneuvers, noise = e.found.model, e.found.maneuvers, intervals.coherence
-    # Of frequencies the residuals are not those of samples.
+    # Residuals of a fit in frequency are not those of samples.
     ours = result.residual_kind == "output" and all(
         y.shape == m.outputs.shape for y, m in zip(result.fitted, maneuvers, strict=True)
     )

@@ -72,7 +72,7 @@ def cost_by_residuals(
     ----------
     model : LinearModel
     fitted : FitResult
-        Of white output error, to the `first_part` of each maneuver.
+        Fit of white output error, to the `first_part` of each maneuver.
     maneuvers : sequence of Maneuver
         Whole.
     """
@@ -105,11 +105,11 @@ def cost_by_innovations(
     model : LinearModel
         With delays, which go out of the rest as they did.
     moving : LinearFit
-        Of filter error, to the `first_part` of each maneuver.
+        Fit of filter error, to the `first_part` of each maneuver.
     maneuvers : sequence of Maneuver
         Whole.
     airspeed_mps : float or None
-        Of the trim, for the time scale of gusts.
+        Airspeed at trim, for the time scale of gusts.
     """
     delays = {name: value for name, (value, _) in moving.delays.items()}
     whole = [advance_outputs(m, model, delays) if delays else m for m in maneuvers]

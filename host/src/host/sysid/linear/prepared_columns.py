@@ -45,14 +45,14 @@ class PreparedColumns:
         In the fit, and kept for validation.
     airframe : AirframeData or None
     spin : tuple of float
-        Of the rotor (`spin_of`).
+        Angular momentum of the rotor (`spin_of`).
     first_departures : list of Array
         What departures from the trim do to the outputs of each maneuver, by a first fit: zero where
         a finer one finds them itself.
     record : tuple of ColumnChange
         What was done to the columns, that of the flights before it.
     servo : ServoEstimate or None
-        Of the inputs that are commands.
+        Servo of the inputs that are commands.
     """
 
     chosen: ChosenModel

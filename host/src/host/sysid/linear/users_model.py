@@ -57,9 +57,9 @@ def fit_users_model(
     model : LinearModel
     maneuvers : sequence of Maneuver
     airspeed_mps : float or None
-        Of the trim, for the time scale of gusts; None where nobody measured it.
+        Airspeed at trim, for the time scale of gusts; None where nobody measured it.
     options : mapping
-        Of the method.
+        Options of the method.
 
     Raises
     ------

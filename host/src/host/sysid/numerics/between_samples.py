@@ -24,9 +24,10 @@ from host.sysid.numerics.simulator import Response
 OTHER_HOLD = {"foh": "zoh", "zoh": "foh"}
 MOST_JUMPS = 20  # of all records: those that may move the mean of an input most
 WHOLE = 1.1  # times what is possible: the answer is linear about a hold that is not the right one
-# Of the power of a residual: less after what inputs may have done is no noise of a sensor.
+# Share of the power of a residual: less after what inputs may have done is no noise of a sensor.
 EXPLAINED_BUT = 0.05
-# Of a residual's deviation: the other hold moves outputs by less where inputs explain little of it.
+# Share of a residual's deviation: the other hold moves outputs by less where inputs explain little
+# of it.
 SMALL = 0.2
 RIDGE = 1e-12  # of scaled columns
 STRAIGHT = 1e-6  # of an input's range: what jumps by less does not
@@ -191,7 +192,7 @@ def _directions(
     if np.all(moved < SMALL**2 * power):
         return [], np.zeros(0)
     bent = change(model, with_bent_controls(model, maneuvers))
-    # Of inputs that are held one interval can be moved alone.
+    # Held inputs can be moved in one interval alone.
     steps = replace(model, hold="zoh")
     still = change(steps, maneuvers)
     directions = [held, bent]

@@ -22,7 +22,7 @@ def coloured_score_covariance(residual: Array, sensitivities: Array) -> Array:
     ----------
     residual : Array, shape (samples,)
     sensitivities : Array, shape (samples, columns)
-        Of the modelled output, by each parameter.
+        Sensitivities of the modelled output, by each parameter.
 
     Returns
     -------

@@ -47,7 +47,7 @@ class EquationModel(NamedTuple):
     offset, offset_column
         Added to the outputs, (outputs,).
     delay_s, delay_column
-        Of each output, s.
+        Delay of each output, s.
     leader : IntArray, shape (outputs,)
         First output with the same delay.
     input_column : IntArray, shape (m,)

@@ -19,7 +19,7 @@ from host.sysid.numerics.recursion import STATE_LIMIT
 
 SHORTEST = 1e-9  # of a sample: no step is
 JUMP_OFFSET = 1e-6  # of a sample: before and behind a jump
-# Of each stage: weight, how late its inputs are, how far ahead of the begin the next stage is.
+# Stages of a step: weight, how late the inputs are, how far ahead of the begin the next stage is.
 STAGES = ((1.0, 0.0, 0.5), (2.0, 0.5, 0.5), (2.0, 0.5, 1.0), (1.0, 1.0, 0.5))
 
 

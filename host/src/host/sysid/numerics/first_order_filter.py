@@ -24,6 +24,6 @@ def first_order_filter(b: Array, a: Array, values: Array) -> Array:
     driven[1:] += b[1] * values[:-1]
     bands = np.ones((2, len(values)), order="F")
     bands[1] = a[1]
-    # Of a triangle nothing is to be factorised: a fifth of the time of `linalg.solve_banded`.
+    # A triangle needs no factorising: a fifth of the time of `linalg.solve_banded`.
     filtered, _ = lapack.dtbtrs(bands, driven, uplo="L", diag="U")
     return np.asarray(filtered)

@@ -54,11 +54,11 @@ class InnovationLikelihood:
     Attributes
     ----------
     runs : sequence of Filtered
-        Of every maneuver.
+        Run of every maneuver.
     cost : float
         Negative log likelihood and prior, up to a constant.
     filters : sequence of SteadyStateFilter
-        Of every maneuver of a linear model, all outputs measured.
+        Filter of every maneuver of a linear model, all outputs measured.
     """
 
     runs: Sequence[Filtered]
@@ -86,7 +86,7 @@ class InnovationSlopes:
     Attributes
     ----------
     by_white : Array, shape (samples, p, k)
-        Of the whitened innovations, the whitener as it is.
+        Slopes of the whitened innovations, the whitener as it is.
     columns : IntArray, shape (k,)
         By which unknowns.
     information, score : Array, shape (shared, shared), (shared,)
@@ -108,7 +108,7 @@ class InnovationProblem(ABC):
     Parameters
     ----------
     outputs : OutputProblem
-        Of the model and its maneuvers.
+        Problem of the model and its maneuvers.
     process : tuple of str
         States that white process noise drives.
 

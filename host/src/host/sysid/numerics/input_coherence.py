@@ -16,8 +16,8 @@ The noise model is estimated together with those columns (restricted likelihood)
 drive is then not taken for noise.
 
 What sensors may have wrong by their file is in the intervals by itself, and no lack of the model:
-each error takes of the residual what its deviation allows. In calm air a right pitot 1 % off was
-"the scale of az_mps2", and half-widths of Cm_q were 3.8 times the rms error.
+each error takes of the residual what its deviation allows. Otherwise a right pitot, 1 % off, is
+"the scale of az_mps2" in calm air, and half-widths of Cm_q are 3.8 times the rms error.
 """
 
 from __future__ import annotations
@@ -65,18 +65,18 @@ class InputCoherence:
     ratio : Array, shape (p,)
         F: power along the added columns over that of noise; 1 if the model is right.
     p_value : Array, shape (p,)
-        Of each output alone.
+        Probability of each output alone.
     columns : Array, shape (p,)
         Degrees of freedom of the numerator.
     noise : tuple of ArNoise
-        Of each output, without what the inputs drive.
+        Noise of each output, without what the inputs drive.
     innovation_variance : Array, shape (p,)
     signature : SignatureTest
-        Of usual errors of a model.
+        Test of the signatures of usual errors of a model.
     samples : int
         Means that were tested, of each output.
     information : Array, shape (p, P, P)
-        Of each output, whitened by this noise.
+        Information of each output, whitened by this noise.
     prior_precision : Array, shape (P,)
     """
 
@@ -164,14 +164,14 @@ def input_coherence(
     problem : OutputProblem
         Model and data.
     responses : sequence of Response
-        Of the model at the estimate, one of each maneuver.
+        Response of the model at the estimate, one of each maneuver.
     theta : Array, shape (P,)
         The estimate, constants of the maneuvers included.
     nuisance : sequence of Array, shape (p, samples, k)
-        Of each maneuver, the change of the residual by one deviation of each of k errors that are
+        Change of the residual of each maneuver by one deviation of each of k errors that are
         counted elsewhere; none without.
     highest_order : int
-        Of the AR models.
+        Highest order of the AR models.
     block_s : float
         Residuals are taken in means over this long; 0 keeps the samples, and the noise models are
         then those of samples.
@@ -298,7 +298,7 @@ def prior_of(
     problem : OutputProblem
     theta : Array, shape (P,)
     data : sequence of OutputData
-        Of `driven_data`.
+        Data by `driven_data`.
     """
     own, known = problem.prior_precision, data[0].slopes[0].shape[1] - len(problem.names)
     pulled = np.concatenate([own * (problem.prior_mean - theta), np.zeros(known)])
@@ -323,9 +323,8 @@ def block_length(dt_s: float, block_s: float = BLOCK_S) -> int:
 def block_means(values: Array, block: int, seen: BoolArray | None = None) -> Array:
     """Return the means of successive blocks of samples, (samples // block, columns).
 
-    Of those `seen` alone, (samples,) or of each column, where it is given: of a sensor that is
-    slower than the rows a mean with what it did not measure as zero says a part of its noise. Zero
-    where nothing was seen.
+    Only those `seen` count, (samples,) or of each column, where it is given: a mean with what a
+    slower sensor did not measure as zero says a part of its noise. Zero where nothing was seen.
     """
     count = len(values) // block
     blocks = values[: count * block].reshape(count, block, -1)
@@ -347,7 +346,7 @@ def lag_knots_s(dt_s: float, shortest_s: float) -> Array:
     dt_s : float
         Sample period; no knot is nearer to zero.
     shortest_s : float
-        Of the records.
+        Length of the shortest record.
     """
     longest_s = min(LONGEST_S, LAG_SHARE * shortest_s)
     knots = [0.0, max(FIRST_KNOT_S, dt_s)]
@@ -368,7 +367,7 @@ def input_regressors(inputs: Array, modelled: Array, dt_s: float, knots_s: Array
         and without sign, stand for what is not linear.
     dt_s : float
     knots_s : Array
-        Of `lag_knots_s`.
+        Knots by `lag_knots_s`.
     """
     samples = len(inputs)
     lag_s = np.arange(int(np.ceil(knots_s[-1] / dt_s)) + 1) * dt_s

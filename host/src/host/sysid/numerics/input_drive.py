@@ -112,10 +112,10 @@ def _known_directions(
     Parameters
     ----------
     directions : sequence of Array, shape (samples, k)
-        Of each maneuver; orthonormal when whitened, in units of noise.
+        Directions of each maneuver; orthonormal when whitened, in units of noise.
     noise : ArNoise
     variance : float
-        Of the innovations.
+        Variance of the innovations.
     samples : int
 
     Returns

@@ -31,7 +31,7 @@ class FilterEquations:
     Q, Q_slopes : Array, shape (n, n), (n, n, shared)
         Covariance of the process noise of a sample.
     variance : Array, shape (p,)
-        Of the measurement noise.
+        Variance of the measurement noise.
     P, P_slopes : Array, shape (n, n), (n, n, shared)
         Covariance of the predicted state of the first sample.
     """
@@ -56,7 +56,7 @@ class FilterEquations:
 class SequentialInnovations:
     """Innovations of one maneuver, outputs of a sample taken in turn.
 
-    Of what was not measured they are zero, their variance one.
+    What was not measured has innovation zero, of variance one.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class SequentialInnovations:
     def slopes(self, columns: IntArray) -> InnovationSlopes:
         """Return slopes by these unknowns, those first that the variance depends on, (L,).
 
-        Of an innovation w of variance s, given those before, the information is dw dw / s + ds ds /
+        An innovation w of variance s, given those before, has the information dw dw / s + ds ds /
         (2 s^2) (Klein & Morelli, Aircraft System Identification, ch. 6).
         """
         spread = self.by_variance.reshape(-1, self.by_variance.shape[2])

@@ -33,7 +33,7 @@ class JointNoise:
     ----------
     coefficients : Array, shape (order, p, p)
     covariance : Array, shape (p, p)
-        Of the innovations w.
+        Covariance of the innovations w.
     """
 
     coefficients: Array
@@ -123,7 +123,7 @@ def joint_noise(
     data : sequence of OutputData
         One of each output, of successive means.
     prior, pulled : Array, shape (P,)
-        Of `prior_of`.
+        Prior by `prior_of`.
     least_variance : Array, shape (p,)
     """
     residuals = [np.stack(e, axis=1) for e in zip(*(d.residuals for d in data), strict=True)]

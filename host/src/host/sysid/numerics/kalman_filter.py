@@ -73,9 +73,9 @@ def take_output(
     by_left : Array, shape (L,)
         Overwritten by slopes of the innovation over its deviation.
     variance, noise : float, int
-        Of its noise, and the unknown that is the logarithm of that noise's deviation.
+        Variance of its noise, and the unknown that is the logarithm of that noise's deviation.
     change, by_change : Array, shape (n,), (n, L)
-        Of the states by the outputs of this sample, added to.
+        Change of the states by the outputs of this sample, added to.
     by_spread : Array, shape (shared,)
         Overwritten by slopes of the returned variance over itself.
     """
@@ -149,7 +149,7 @@ def filter_maneuver(
     lower, upper : Array, shape (n,)
         Bounds of the state.
     variance : Array, shape (p,)
-        Of the measurement noise.
+        Variance of the measurement noise.
     measured, seen : Array, shape (samples, p)
         What was measured, and whether.
     by_independent, by_spread : Array, shape (samples, p, L), (samples, p, shared)
@@ -236,7 +236,7 @@ def filter_without_slopes(
     variance, measured, seen
         As of `filter_maneuver`.
     bounds : tuple of Array, optional
-        Of the state, (n,) each.
+        Bounds of the state, (n,) each.
 
     Returns
     -------

@@ -74,7 +74,7 @@ def maneuver_influence(
     information, scores : sequence of Array
         Per maneuver, (P, P) and (P,), without the prior.
     inverse : Array, shape (P, P)
-        Of the whole information, prior included.
+        Inverse of the whole information, prior included.
     """
     return {
         "maneuver_influence": np.array([inverse @ g for g in scores]),
@@ -121,7 +121,7 @@ def scatter_test(
     influence, information_share : Array, shape (maneuvers, P)
         Influence of each maneuver on the estimate, and its share of the information.
     variance : Array, shape (P,)
-        Of the estimate, as far as its causes differ between maneuvers.
+        Variance of the estimate, as far as its causes differ between maneuvers.
     """
     total = np.maximum(np.sum(information_share, axis=0), 1e-12)
     weight = np.clip(information_share / total, 0.0, 1.0)

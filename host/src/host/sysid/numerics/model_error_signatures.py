@@ -41,9 +41,9 @@ def model_error_signatures(
     ----------
     problem : OutputProblem
     number : int
-        Of the maneuver, from 0.
+        Number of the maneuver, from 0.
     response : Response
-        Of the model at `theta`.
+        Response of the model at `theta`.
     theta : Array, shape (P,)
         Common parameters first.
     """

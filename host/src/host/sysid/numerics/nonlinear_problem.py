@@ -18,8 +18,9 @@ from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.simulator import EquationMotion
 
 MOST_SUBSTEPS = 64
-# Of an output's spread: what halving the step may move it by. Noise is a thousandth at least
-# (`CLEAN_SHARE`): over 10 000 samples this is a tenth of a half-width, were it all of one sign.
+# What halving the step may move an output by, as a share of its spread. Noise is a thousandth at
+# least (`CLEAN_SHARE`): over 10 000 samples this is a tenth of a half-width, were it all of one
+# sign.
 STEP_TOLERANCE = 1e-6
 
 

@@ -170,7 +170,7 @@ def covariance_of_free(
     information : Array, shape (P, P)
     free : BoolArray, shape (P,)
     names : sequence of str, optional
-        Of the parameters; by default their numbers from 1.
+        Names of the parameters; by default their numbers from 1.
 
     Raises
     ------

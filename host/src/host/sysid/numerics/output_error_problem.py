@@ -20,8 +20,9 @@ from host.sysid.numerics.simulator import (
     simulate_with_slopes,
 )
 
-# Of an output's motion: no column is better than this, nor the model of it. Without noise in one
-# column its information drowned that of all others, and 73 to 93 % of the intervals held.
+# Least noise as a share of an output's motion: no column is better than this, nor the model of it.
+# The information of one column without noise would drown that of all others, and 73 to 93 % of the
+# intervals would hold.
 CLEAN_SHARE = 1e-3
 
 
@@ -51,7 +52,7 @@ class OutputProblem:
     clean_variance : Array, shape (p,)
         The same without the numbers' step: below it is no noise of a sensor.
     known_variance : Array, shape (p,)
-        Of the noise of outputs for which the model states it; NaN where it is estimated.
+        Variance of the noise of outputs for which the model states it; NaN where it is estimated.
     counts : Array, shape (p,)
         Samples at which each output was measured.
 
@@ -145,7 +146,7 @@ class OutputProblem:
         Parameters
         ----------
         residuals : sequence of Array, each (p, samples)
-            Of every maneuver, zero of what was not measured.
+            Residuals of every maneuver, zero where nothing was measured.
         """
         deviation = self._share_scale() * np.std(np.hstack(residuals), axis=1)
         return np.asarray(np.maximum(deviation, 1e-12))

@@ -20,8 +20,9 @@ from host.sysid.numerics.joint_noise import JointNoise
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.simulator import Response
 
-# Of a noise's power over that of what is left: more has a record without noise alone. In side gusts
-# of 0.3 m/s a fit leaves half of it in r, two thirds in beta; beyond 3 no interval moves there.
+# Most of a noise's power over that of what is left: more has a record without noise alone. In side
+# gusts of 0.3 m/s a fit leaves half of it in r, two thirds in beta; beyond 3 no interval moves
+# there.
 MOST_POWER = 3.0
 
 
@@ -39,7 +40,7 @@ def white_fit_covariance(
     responses : sequence of Response
         At the estimate.
     noise : JointNoise
-        Of the block means of all outputs.
+        Noise of the block means of all outputs.
 
     Returns
     -------
@@ -88,7 +89,7 @@ def variance_ratio(
     noise : sequence of ArNoise
         Counted on, of the block means of each output.
     variance : Array, shape (p,)
-        Of their innovations.
+        Variance of their innovations.
     larger : collection of str
         Outputs whose residuals count as they are; the others are taken for the noise counted on.
 

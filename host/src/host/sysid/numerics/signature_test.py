@@ -45,8 +45,8 @@ class SignatureTest:
     outputs : tuple of str
         Those that show it.
     shift : Array, shape (P,)
-        Of the estimate, had the model this error at the size that the residual shows: the bias of
-        omitted variables, -C J' W z a with signature z and size a (EQUATIONS.md, eq. 36).
+        Shift of the estimate, had the model this error at the size that the residual shows: the
+        bias of omitted variables, -C J' W z a with signature z and size a (EQUATIONS.md, eq. 36).
     """
 
     name: str
@@ -79,7 +79,7 @@ def signature_test(
     Parameters
     ----------
     outputs, names : sequence of str
-        Of the outputs and the signatures.
+        Names of the outputs and the signatures.
     data : sequence of WhitenedOutput
     inverse : Array, shape (P, P)
         Covariance of the parameters, prior included.

@@ -32,7 +32,8 @@ from host.sysid.numerics.feedback_record import LONGEST_S, NO_FILTER, SHAPES, Fe
 STEP_S = 0.02
 DELAYS_S = STEP_S * np.arange(round(LONGEST_S / STEP_S) + 1)  # that are tried
 RESPONSE_STEPS = 2  # steps: from here on a signal answers the input
-# Of the input's variance: what a law leaves gives the derivatives beside it ten times the variance.
+# Share of the input's variance: what a law leaves gives the derivatives beside it ten times the
+# variance.
 MOST_LEFT = 0.1
 # A part of the input whose amplitude is within what an estimate is trusted by is as good as none.
 LEAST_LEFT = TRUST_SHARE**2
@@ -49,7 +50,7 @@ class FeedbackLaw:
     signals : tuple of str
         The strongest first.
     gains : tuple of float
-        Of each, input over signal.
+        Gain of each signal, input over signal.
     delay_s, lag_s : float
     washout_s : float
         Time constant; infinite without.
