@@ -11,7 +11,7 @@ elevator_rad = { from = "de", commanded = true }    # a command: the surface com
 aileron_rad = { from = "left", minus = "right", scale = 0.5 }
 ```
 
-Of a table of others a map hides what it does not name, but for the time. `base = "inav"` above it
+A map hides what it does not name of a table of others, but for the time. `base = "inav"` above it
 all takes the lines of a shipped map (`shipped_maps.py`) that it does not have itself.
 """
 

@@ -42,9 +42,9 @@ class Channels:
     unknown_outputs : str
         What the log says of outputs that move no surface, where none moves one; empty else.
     clipped : dict of str to int
-        Of a surface or an IMU, samples at the end of its range.
+        Samples of a surface or an IMU at the end of its range.
     output_period_s : float
-        Of the pulses that servos get.
+        Period of the pulses that servos get.
     vibration_mps2 : float
         As the autopilot measured it; NaN if it did not.
     """

@@ -31,7 +31,7 @@ def controls_of_pulses(
         By pin, from 1.
     parameters : mapping of str to float
     group : str
-        Of `GROUPS`: which parameters name the pins.
+        One of `GROUPS`: which parameters name the pins.
 
     Returns
     -------

@@ -55,7 +55,7 @@ class _Received:
     parts: dict[tuple[int, str], list[Fields]] = field(default_factory=dict)
     frames: int = 0
     last_number: dict[int, int] = field(default_factory=dict)
-    # Of each sender, portion by portion: its frames, and before which ones some are missing.
+    # By sender, portion by portion: its frames, and before which ones some are missing.
     many: dict[int, list[NDArray[np.uint32]]] = field(default_factory=dict)
     gaps: dict[int, list[IntArray]] = field(default_factory=dict)
     wrong_crc: int = 0

@@ -77,7 +77,7 @@ class ULogContent:
         Parameters as they were written: name, value, and the time, us, of the message before it; 0
         before logging began.
     said : dict of str to str
-        Of the information messages those in `SAID`.
+        Values of those information messages that are in `SAID`.
     dropouts, dropped_ms : int
         How often the card could not keep up, and for how long together.
     strange, strange_at : int
@@ -111,9 +111,9 @@ def read_content(
     ----------
     path : Path
     wanted : callable
-        Of a topic's name: is it read?
+        Says by a topic's name whether it is read.
     read : callable
-        Of a topic's name and a column's: is it read?
+        Says by a topic's name and a column's whether it is read.
 
     Raises
     ------
@@ -153,7 +153,7 @@ class _Reading:
         self.found = ULogContent()
         self._wanted, self._read = wanted, read
         self.formats = Formats()
-        # Of each number of a subscription: fewest and most bytes, and which topic that is read.
+        # By the number of a subscription: fewest and most bytes, and which topic that is read.
         self._fewest = np.full(1 << 16, 1 << 17)
         self._most = np.zeros(1 << 16, np.int64)
         self._topic = np.full(1 << 16, -1, np.int16)

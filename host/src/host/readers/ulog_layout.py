@@ -92,7 +92,7 @@ class Formats:
         ----------
         name : str
         read : callable
-            Of a column's name: ``q[0]``, ``esc[1].rpm``; is it read?
+            Says by a column's name, ``q[0]``, ``esc[1].rpm``, whether it is read.
 
         Raises
         ------

@@ -15,7 +15,7 @@ import numpy as np
 from host.arrays import Array
 from host.readers.ardupilot_outputs import Outputs
 
-# Of outputs: what each moves, its ends, its middle, its sense.
+# Parameters of outputs: what each moves, its ends, its middle, its sense.
 OF_OUTPUTS = re.compile(
     r"(SERVO|RC)\d+_(FUNCTION|MIN|MAX|TRIM|REVERSED|REV)|PWM_(MAIN|AUX)_(FUNC|MIN|MAX|CENT|REV)\d*"
     r"|CA_SV_CS(\d+_TYPE|_COUNT)"
@@ -77,10 +77,10 @@ def made_of_outputs(
     Parameters
     ----------
     t_s : (n,) array
-        Of the outputs.
+        Times of the outputs.
     parameters : mapping of str to float
     make : callable
-        Of rows and the parameters that stood then.
+        Makes outputs of rows and the parameters that stood then.
     """
     every = parameters.changes if isinstance(parameters, Parameters) else {}
     changes = {name: own for name, own in every.items() if OF_OUTPUTS.fullmatch(name)}

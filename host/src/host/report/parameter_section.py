@@ -21,7 +21,7 @@ def parameter_tables(numbers: JsonNumbers, at: int, label: str, causes: Mapping[
     Parameters
     ----------
     numbers : JsonNumbers
-        Of the whole answer.
+        Numbers of the whole answer.
     at : int
         Place of this one under ``answers``.
     label : str

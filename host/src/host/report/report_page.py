@@ -46,7 +46,7 @@ class ReportParts:
     second : Identification or None
         The same flights by a second method, for comparison only: no verdict is given of it.
     flights : list of ShownFlight
-        Of the sources that are logs.
+        Flights of the sources that are logs.
     aircraft : str
         Name or file; empty without one.
     versions, hashes : dict of str to str

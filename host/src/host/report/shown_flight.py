@@ -25,7 +25,7 @@ class Happening:
     t_s : float
     text : str
     end_s : float
-        Of a range; `t_s` where it is an instant.
+        End of a range; `t_s` where it is an instant.
     """
 
     t_s: float

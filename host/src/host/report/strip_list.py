@@ -44,7 +44,7 @@ class Strip:
 def strips_of(names: Collection[str]) -> list[Strip]:
     """Return the strips a flight has: those of whose channels at least one was measured.
 
-    Of two strips of one name the first that is whole stands.
+    The first of two strips of one name that is whole stands.
     """
     found: dict[str, Strip] = {}
     for name, wanted, on in _STRIPS:

@@ -41,7 +41,7 @@ def fit_genetic(
     population, generations : int
         Size of the search.
     seed : int
-        Of the random numbers: the answer is repeatable.
+        Seed of the random numbers: the answer is repeatable.
     polish : bool
         Estimate AR models of the noise in the final fit; those of one sample period only.
     """

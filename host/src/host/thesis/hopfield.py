@@ -150,7 +150,7 @@ def fit_hopfield(
         from least squares without, as the study of the thesis's flights does; others from the
         model's start values.
     bandwidth : float, optional
-        Of the differentiation, Hz.
+        Bandwidth of the differentiation, Hz.
 
     Returns
     -------

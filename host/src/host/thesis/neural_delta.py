@@ -15,7 +15,8 @@ from host.sysid.models import FitResult, LinearModel, Maneuver
 
 NEURONS = 6
 DECAY_LEAST = 1e-3
-# Of the share of the dependent variable that a plane does not explain: 10 % error instead of 67 %.
+# Decay of weights over the share of the dependent variable that a plane does not explain: an error
+# of 10 % in place of 67 %.
 DECAY_PER_NOISE = 0.5
 STEP = 0.5  # perturbation in standard deviations of the input
 BLOCKS = 20
@@ -47,9 +48,9 @@ def fit_neural(
     repeats : int
         Trainings on resampled blocks, at least 3; their scatter is the covariance.
     seed : int
-        Of start weights and resampling.
+        Seed of start weights and resampling.
     bandwidth : float, optional
-        Of the differentiation, Hz.
+        Bandwidth of the differentiation, Hz.
     """
     if repeats < 3:
         raise IdentificationError(f"{repeats} trainings tell no scatter, at least 3 are needed")

@@ -44,7 +44,7 @@ def line_search(
     model, maneuvers
         The simulation whose error decides: the program's own figure, the mean over the maneuvers.
     names, W, b
-        Of `network`.
+        Names and matrices of `network`.
     start : Array
         Start; the program was started from its own earlier answer.
     sweeps : int

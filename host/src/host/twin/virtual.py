@@ -64,8 +64,8 @@ def virtual_flight(
         ``gps`` the sensors without recorder, ``none`` the same without GPS; ``true`` the truth in
         the same columns; ``thesis`` its logger.
     errors, instrument_seed, noise_seed, aircraft
-        Of the instrument, of gusts and sensor noise, and what flies in place of the card's
-        aircraft, as `fly` takes them.
+        Errors of the instrument, seeds of it and of gusts and sensor noise, and what flies in place
+        of the card's aircraft, as `fly` takes them.
 
     Returns
     -------

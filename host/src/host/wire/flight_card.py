@@ -34,7 +34,7 @@ FREQUENCY = {"pulse": 50_000, "doublet": 100_000, "three_two_one_one": 350_000}
 MOST_SHARES = 252  # largest sum of the tones' shares on an axis; a share is in 64ths
 TRAVEL_US = (800, 2200)
 NONE = 255
-# Of an axis that is learned: firmware/core/learning/axis_card.h.
+# Sizes of an axis that is learned: firmware/core/learning/axis_card.h.
 YAW, PITCH_SIGNALS, MOST_SIGNALS, MOST_SUMS = 2, 3, 5, 30
 
 
@@ -193,7 +193,7 @@ def card_faults(data: bytes) -> list[str]:
     Parameters
     ----------
     data : bytes
-        Of a file.
+        Bytes of a file.
     """
     size, heads, most = (number(f"card_{n}") for n in ("part_bytes", "head_parts", "most_rows"))
     learned = number("card_axis_parts") * number("card_most_axes")

@@ -2,7 +2,7 @@
 
 Between flights: the profile of the restricted likelihood. That no variance is negative narrows it:
 with three flights of each of eight equal aircraft an interval by the flights' squares alone is 1.24
-times as wide as an oracle's by chi-squared; the profile was 1.04 times in 100 drawn fleets.
+times as wide as an oracle's by chi-squared; the profile is 1.04 times (`studies.fleet_truth`).
 
 Between aircraft: all values that the weighted squares of the aircraft do not reject (Q profile:
 Viechtbauer, Statistics in Medicine 26, 2007). The flights' spread stands in the denominator and is

@@ -47,7 +47,7 @@ class FlightRecord:
     Attributes
     ----------
     seed : int
-        Of air and sensor noise.
+        Seed of air and sensor noise.
     t_s : (n,) array
         True time since power-on.
     states : (n, 17) array

@@ -21,7 +21,7 @@ STEP_S = 0.05
 STOP_DEG = 60.0  # of the vane's housing, hw/mechanics/vane.toml limit_deg
 SWITCH_MEGA_US = 1900.0
 SURFACES = ("elevator", "aileron", "rudder")
-# Of a receiver that is set up: neutral, idle, the switch so that the logger knows
+# Preset of a receiver that is set up: neutral, idle, the switch so that the logger knows
 # (firmware/settings.toml, input_switch).
 PRESET_US = {**dict.fromkeys(SURFACES, NEUTRAL_US), "throttle": IDLE_US, "switch": 880.0}
 ROLL, PITCH, YAW = range(3)

@@ -123,7 +123,7 @@ def simulate(
     logs : sequence of str
         Write these logs of other autopilots too: keys of `autopilot_logs.WRITERS`.
     airframe : str
-        Of these, one of `autopilot_outputs.AIRFRAMES`.
+        Airframe of these logs, one of `autopilot_outputs.AIRFRAMES`.
     aircraft : Aircraft, optional
         In place of the card's.
     flight_card : bytes

@@ -99,7 +99,7 @@ def record(
     faults : sequence of Fault
         Those of card, barometer and supply act here; the others are in the stimuli already.
     seed : int
-        Of the garbage that a power cut leaves in a block being programmed.
+        Seed of the garbage that a power cut leaves in a block being programmed.
     flight_card : bytes
         In its EEPROM; empty for none.
     progress : callable

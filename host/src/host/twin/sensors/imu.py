@@ -272,7 +272,7 @@ class ImuSampling:
         self._carry_s = FILTERS[dlpf][0][1] if self._switches.imu_filter else 0.0
         self._c, self._kept = np.zeros((3, 3)), np.zeros((4, 3))
         self._heading, self._speed = np.zeros(m), np.zeros(m)
-        # Of every step: as sensed, behind the low-pass, true angles unwrapped, ground speed.
+        # Values of every step: as sensed, behind the low-pass, true angles unwrapped, ground speed.
         self._sensed = [np.zeros((n, 3)), np.zeros((n, 3))]
         self._slow = [np.zeros((n, 3)), np.zeros((n, 3))]
         self._angles, self._ground = np.zeros((n, 3)), np.zeros(n)

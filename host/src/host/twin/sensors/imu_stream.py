@@ -83,7 +83,7 @@ class ImuSender:
     at_s : (m,) array
         True times of the samples.
     starts : (m,) array
-        Of their packets, in ticks.
+        Starts of their packets, in ticks.
     own_clock : float
         Its seconds in a true one.
     sampling : ImuSampling

@@ -18,7 +18,7 @@ def sine_inputs(s: Segment, t_s: Array) -> list[Array]:
     Parameters
     ----------
     s : Segment
-        Of a kind that has no steps.
+        Segment of a kind that has no steps.
     t_s : Array, shape (n,)
         Time from the start of the input.
     """
