@@ -68,7 +68,7 @@ def gusty(seed: int, dt_s: float, *, intensity_mps: float = 0.5, pilot: bool = F
     Parameters
     ----------
     seed : int
-        Of gust and sensor noise.
+        Seed of gust and sensor noise.
     dt_s : float
         Sample period, s.
     intensity_mps : float

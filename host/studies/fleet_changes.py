@@ -21,7 +21,7 @@ from host.fleet.statistics.loaded_flight import LoadedFlight
 from host.fleet.statistics.watched_quantities import flight_spread
 
 FIRST_SEED = 22_400
-# Of an Ultra Stick 25e, and standard deviations as one demonstration flight has them.
+# Coefficients of an Ultra Stick 25e, and standard deviations as one demonstration flight has them.
 USUAL = {
     "CL_alpha": 4.6, "CL_q": 7.9, "CL_de": 0.56, "Cm_alpha": -1.75, "Cm_q": -11.4, "Cm_de": -1.3,
     "CY_beta": -0.83, "CY_r": 0.3, "CY_dr": 0.19, "Cl_beta": -0.06, "Cl_p": -0.45, "Cl_da": -0.17,

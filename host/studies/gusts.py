@@ -221,7 +221,7 @@ def fly(
     intensity_mps : float
         Standard deviation of the vertical gust.
     seeds : sequence of int
-        Of gusts and sensor noise; a flight does not depend on its neighbours.
+        Seeds of gusts and sensor noise; a flight does not depend on its neighbours.
     with_pilot : bool
         Whether the twin's pilot corrects bank or pitch on top of the test input.
     """

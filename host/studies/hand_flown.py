@@ -184,7 +184,7 @@ def flown(
     Parameters
     ----------
     plane : str
-        Of `PLANES`.
+        One of `PLANES`.
     seed : int
     inputs : int
         As many, evenly spread; 0: handling alone.

@@ -24,7 +24,8 @@ WITHIN_S = 1.0
 
 @dataclass
 class Score:
-    """Of one aircraft at one rate: inputs flown and found, false ones in hours of handling."""
+    """Score of one aircraft at one rate: inputs flown and found, false ones in hours of
+    handling."""
 
     flown: int = 0
     found: int = 0

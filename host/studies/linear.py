@@ -100,7 +100,7 @@ def derivatives(
     local : mapping
         Coefficients, moments about the CG.
     maneuvers : sequence of mapping
-        Of the truth file.
+        Maneuvers of the truth file.
     axis : str
         ``longitudinal`` or ``lateral``.
     sizes : AirframeData

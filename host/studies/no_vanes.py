@@ -50,7 +50,7 @@ STANDS_S = 1.0
 INCLINOMETER_RAD = np.radians(0.25)  # one deviation: of the instrument and of the ground
 ANGLES = {"alpha": 1, "beta": 2}  # and the axis that the IMU's tilt turns them about
 OPEN = ", tilt open"  # behind an angle: nobody measured how the aircraft stands
-# Of an angle: rms, mean and stated deviation of its error, tilt of the IMU, deg.
+# Columns of an angle: rms, mean and stated deviation of its error, tilt of the IMU, deg.
 COLUMNS = (
     "seed", "turbulence_mps", "name", "true", "estimate", "half_width", "mark", "with_vanes",
     "rms_deg", "mean_deg", "stated_deg", "tilt_deg",

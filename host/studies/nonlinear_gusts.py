@@ -213,7 +213,7 @@ def fly_nonlinear(
     intensity_mps : float
         Standard deviation of the vertical gust.
     seeds : sequence of int
-        Of gusts and sensor noise.
+        Seeds of gusts and sensor noise.
     with_pilot : bool
         Whether the pilot corrects bank or pitch of the axis under test too.
     """

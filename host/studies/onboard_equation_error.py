@@ -37,7 +37,7 @@ class Learned:
     Attributes
     ----------
     estimate, half_width : (signals,) arrays
-        Of the coefficient's derivatives; a half-width of 0: not estimated.
+        Values of the coefficient's derivatives; a half-width of 0: not estimated.
     enough : tuple of bool
         The half-width is at most the wanted share of the estimate.
     """

@@ -52,13 +52,13 @@ class RefusalCheck:
     ----------
     names : tuple of str
     judgement : Identifiability
-        Of the fit, which knows neither truth nor noise.
+        Judgement of the fit, which knows neither truth nor noise.
     shares : Array
         Analytic bounds over reference values: |parameter|, or what would contribute 5 % of its row.
     plain_shares : Array
         The same over |parameter| alone, infinite for a true zero.
     plain_probability : float
-        Of the fit, that some bound exceeds 100 % of |parameter|.
+        Probability by the fit that some bound exceeds 100 % of |parameter|.
     """
 
     names: tuple[str, ...]
@@ -117,7 +117,7 @@ def analytic_bounds(
     bound : Array, shape (parameters,)
         Standard deviations of an efficient estimator, initial states estimated too.
     deviation : Array, shape (states,)
-        Of the noise that gives `snr` as ratio of variances.
+        Deviation of the noise that gives `snr` as ratio of variances.
 
     Raises
     ------

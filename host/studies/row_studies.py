@@ -39,7 +39,7 @@ class RowStudy:
     ----------
     title : str
     columns : tuple of str
-        Of a row; those of the key come first.
+        Columns of a row; those of the key come first.
     keys : callable
         Given the seeds and whether the run is small, the key of each flight.
     fly : callable
@@ -48,7 +48,7 @@ class RowStudy:
         The columns that name a line of the table, besides the derivative.
     first_seed : int
     flights : tuple of int
-        Of a small and of a full run.
+        Flights of a small and of a full run.
     names : tuple of str
         The derivatives shown; none: all.
     """

@@ -60,11 +60,11 @@ def seeded_run(
     Parameters
     ----------
     name : str
-        Of the study, and of its file in build/study.
+        Name of the study, and of its file in build/study.
     about : str or None
         Its docstring, for --help.
     arguments : sequence of str or None
-        Of the command line; None: of the program.
+        Words of the command line; None: of the program.
     flights, first_seed : int
         Without options.
     each : str
@@ -91,7 +91,7 @@ def flown_rows(
     path : Path
         CSV file; made where there is none.
     columns : sequence of str
-        Of a row; the first ones are the key.
+        Columns of a row; the first ones are the key.
     keys : iterable of tuple
         One of each flight, all of one length.
     fly : callable

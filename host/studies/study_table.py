@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Cell = str | int | float
-# Of a picture as matplotlib writes it: digits that nobody sees, comments, names, turns by nothing.
+# Left out of a picture as matplotlib writes it: digits that nobody sees, comments, names, turns by
+# nothing.
 _LEFT_OUT = (
     (r"(\d\.\d)\d+", r"\1"), (r" \nL ", " "), (r"<!--.*?-->", ""), (r'<g id="[^"]+">', "<g>"),
     (r' transform="rotate\(-0 [^"]*"', ""), (r"\n\s+", "\n"),

@@ -46,7 +46,7 @@ def moved(motion: str, command: Array, per: int) -> Array:
     Parameters
     ----------
     motion : str
-        Of `MOTIONS`.
+        One of `MOTIONS`.
     command : Array
     per : int
         Fine steps from sample to sample.
@@ -149,7 +149,7 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
             for name in ("L_p", "L_da"):
                 at = np.array([r["name"] == name for r in some])
                 size = np.abs(true[at])
-                # Of the size: below zero is small.
+                # Error of the size: below zero is small.
                 error = 100.0 * np.mean((np.abs(estimate[at]) - size) / size)
                 line += f"{error:14.2f}{100.0 * np.median(half[at] / size):14.2f}"
             read_held = [r["hold"] for r in some if r["name"] == "L_p"].count("zoh")

@@ -114,7 +114,7 @@ def run_noise(name: str, shape: str = "3-2-1-1", rate_hz: float = 100.0) -> Nois
     name : str
         Key of `SNRS`.
     shape, rate_hz
-        Of the input.
+        Shape and rate of the input.
     """
     snr, iterations = SNRS[name]
     data = thesis_data(shape, rate_hz, snr=snr)

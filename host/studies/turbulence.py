@@ -38,7 +38,7 @@ class GustCase:
     Attributes
     ----------
     intensity_mps, pilot, nonlinear
-        Of the case.
+        Conditions of the case.
     names : tuple of str
     flights, failed : int
         Maneuvers are flown on both axes of each flight; `failed` counts fits that gave no answer.
@@ -169,7 +169,7 @@ def fit_both(
     setup : GustSetup
     maneuver : Maneuver
     truth : Array
-        Of the judged coefficients.
+        Truth of the judged coefficients.
 
     Raises
     ------

@@ -47,7 +47,8 @@ GUST_RAD, GUST_S = 0.012, 1.0  # deviation (0.2 m/s) and time scale of vertical 
 AMPLITUDE_RAD = {"elevator_rad": 0.06, "aileron_rad": 0.07, "rudder_rad": 0.10}
 LAG_S = 0.05  # of a servo that the position does not show
 AIRSPEED_ERROR = 0.10
-# Of M_alpha and N_beta: moment over that of the linear aircraft falls by this share at 0.1 rad.
+# What softens M_alpha and N_beta: moment over that of the linear aircraft falls by this share at
+# 0.1 rad.
 SOFTENING = {"short-period": ("q_radps", "alpha_rad"), "lateral": ("r_radps", "beta_rad")}
 SOFTENING_SHARE, SOFTENING_RAD = 0.4, 0.1
 MISSING = {"short-period": "Z_de", "lateral": "L_r"}
@@ -73,10 +74,10 @@ def fly(name: str, fault: str, noise: str, seed: int, *, scale: float = 1.0) -> 
     name : str
         Template.
     fault, noise : str
-        Of `FAULTS` and `NOISES`.
+        One of `FAULTS` and one of `NOISES`.
     seed : int
     scale : float
-        Of noise and gusts: with next to none a fit shows its limit.
+        Scale of noise and gusts: with next to none a fit shows its limit.
     """
     rng = np.random.default_rng([14, seed, *name.encode(), *fault.encode(), *noise.encode()])
     trim = Trim(AIRSPEED_MPS, 0.06, 0.06)

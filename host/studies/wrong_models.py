@@ -149,7 +149,7 @@ def false_alarms(noise: str, runs: int) -> float:
     Parameters
     ----------
     noise : str
-        Of `studies.coverage.NOISES`.
+        One of `studies.coverage.NOISES`.
     runs : int
     """
     model, dt_s = navion_structured(), 0.05

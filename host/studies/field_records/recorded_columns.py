@@ -34,7 +34,7 @@ def columns_of(
         From `record_flight.fly`.
     by : Draw
     short_period_radps : float
-        Of the aircraft; the bending mode lies at about three times.
+        Frequency of the aircraft's short period; the bending mode lies at about three times.
     rng : Generator
     """
     t = np.arange(len(rows)) / RATE_HZ

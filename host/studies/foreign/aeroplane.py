@@ -133,7 +133,7 @@ def motion(
         u v w p q r phi theta psi, way through the air, height, gusts as the tail meets them (3),
         elevator, aileron, rudder.
     command : tuple of float
-        Of the three servos.
+        Commands of the three servos.
     throttle : float
     air : Gusts or GustLists
     turns : bool

@@ -28,7 +28,7 @@ def with_default_errors(
     Parameters
     ----------
     true : dict of (n,) arrays
-        Of sensors at the CG.
+        Columns of sensors at the CG.
     rng : Generator
     without : collection of str
         Errors that the columns have already; ``places`` and ``upwash`` too.

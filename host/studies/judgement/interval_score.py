@@ -29,7 +29,7 @@ class Judged:
     flight : Array
         Seeds.
     name : Array
-        Of each parameter.
+        Name of each parameter.
     principal : Array
         Whether it is one of the nine.
     error : Array

@@ -59,7 +59,7 @@ class Demand:
     Attributes
     ----------
     bank_rad, pitch_rad, height_m, airspeed_mps : float
-        Of the step.
+        Size of the step.
     at_s, seconds : float
         When, and how long the flight is.
     injected : mapping of str to Array
@@ -147,12 +147,12 @@ def fly(
     Parameters
     ----------
     loops : sequence of ClosedLoop
-        Of the same laws, gains and airspeed.
+        Loops of the same laws, gains and airspeed.
     demand : Demand
     turbulence_mps, gyro_noise_radps : float
         Standard deviations of the vertical gust and of the noise of each gyro.
     seeds : sequence of int
-        Of each aircraft's gusts and noise.
+        Seeds of each aircraft's gusts and noise.
     """
     first, n = loops[0], len(loops)
     moving, speed = first.moving, first.trim.airspeed_mps
@@ -364,7 +364,7 @@ def advance(
         Its states and outputs.
     speed_mps, density_kgpm3, step_s : float
     work : Array
-        Of `step`.
+        Work array of `step`.
     """
     for j in range(pulses.shape[0]):
         if pulses[j]:

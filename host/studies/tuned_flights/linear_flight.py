@@ -27,7 +27,7 @@ def fly_linear(
     demand : Demand
         A step of the problem's axis.
     seed, count : int
-        Of the aircraft drawn.
+        Seed and number of the aircraft drawn.
     """
     axis = problem.axis.axis
     size_rad = demand.bank_rad if axis == "roll" else demand.pitch_rad
