@@ -28,7 +28,7 @@ ROOMS: dict[str, tuple[set[str], set[str]]] = {
     "app": ({"core", "generated", "hal", "drivers", "storage", "app"}, STANDARD),
     "imu": ({"core", "generated", "hal", "drivers", "imu"}, STANDARD),
 }
-# Of firmware/boards: what boards with the same kind of chip share. It knows none of them.
+# Folders of firmware/boards that boards with the same kind of chip share. They know no board.
 SHARED_BOARDS = {"avr"}
 CPP_SUFFIXES = {".h", ".cpp", ".c"}
 INCLUDE = re.compile(r'^\s*#\s*include\s*(<[^>]+>|"[^"]+"|\S+)', re.MULTILINE)
@@ -68,7 +68,7 @@ HOST_FLOORS: dict[str, tuple[str, ...]] = {
         *("linear", "coefficients", "answer", "pipeline"),
     ),
 }
-# Of a function of `host.verbs`, in lines without its docstring; and what only work needs.
+# Length of a function of `host.verbs`, in lines without its docstring; and what only work needs.
 VERB_BODY = 60
 COMPUTING = {"numpy", "pandas", "scipy", "numba", "matplotlib"}
 # Modules outside the rooms that start programs or give the package its names.
