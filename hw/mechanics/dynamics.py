@@ -31,7 +31,7 @@ HERE = Path(__file__).resolve().parent
 SOURCES = ("vane.toml", "solids.py", "drawing.py")
 RHO_KGPM3 = 1.225
 REFERENCE_MPS = 17.0
-# Of every shipped aircraft file (host/src/host/aircraft/airframes).
+# Numbers of every shipped aircraft file (host/src/host/aircraft/airframes).
 SHIPPED = {"frequency_hz_per_mps": 0.8, "damping": 0.35, "friction_rad": 0.0017}
 
 

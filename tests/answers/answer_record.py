@@ -15,7 +15,7 @@ from tests.answers.stored_input import HERE
 
 Record = dict[str, Any]
 DECIMALS = 12  # of a correlation
-# Of a linear model and of coefficients: words, and lists of words.
+# Keys of a linear model and of coefficients: words, and lists of words.
 WORDS = (
     "template", "model", "method", "converged", "residual_kind", "at_bound", "unpredicted",
     "constant_inputs", "maneuvers", "held_out",

@@ -24,7 +24,7 @@ class Case:
     Attributes
     ----------
     name : str
-        Of its frozen answer.
+        Name of its frozen answer.
     sources : tuple of str
         Stored inputs; several are identified jointly.
     options : mapping

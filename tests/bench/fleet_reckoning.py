@@ -17,7 +17,7 @@ class Figures:
     Attributes
     ----------
     minutes : float
-        Of each flight.
+        Length of each flight.
     log_bytes : int
     loop_s, loop_used_s : float
         A flight in a plain loop: by the clock, of the processor.
@@ -34,7 +34,7 @@ class Figures:
     row_bytes : float
         Kept of a flight.
     answer_s, answer_bytes : float
-        Of the type's model, for each of its flights.
+        Time and memory of the type's model, for each of its flights.
     quiet : bool
     load : float
     """
@@ -64,7 +64,7 @@ class Figures:
 
     @property
     def overhead(self) -> float:
-        """Of one worker over a plain loop, by the clock."""
+        """Overhead of one worker over a plain loop, by the clock."""
         return self.one_s / self.loop_s - 1.0
 
     @property

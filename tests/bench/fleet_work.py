@@ -11,7 +11,7 @@ from typing import Any
 from host.fleet.flight_task import IDENTIFIED, described
 
 SLEEP_S = 0.01
-# Of the size of a row of coefficients: 33 derivatives and 40 errors that flights share.
+# Size of a row of coefficients: 33 derivatives and 40 errors that flights share.
 DERIVATIVES, ERRORS = 33, 40
 
 

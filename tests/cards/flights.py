@@ -31,7 +31,7 @@ class FlightFile:
     Attributes
     ----------
     number, state : int, State
-        Of the name, and how it was left.
+        Number of the name, and how it was left.
     first, clusters : int
         Its run: first cluster, and as many as its chain holds.
     used : int
@@ -89,7 +89,7 @@ def add_flight(
     card : SparseCard
         The card; `first` and what follows is free.
     number, first, state : int, int, State
-        Of the name, first cluster, how it was left.
+        Number of the name, first cluster, how it was left.
     used : int
         Blocks recorded.
     file_blocks : int

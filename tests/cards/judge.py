@@ -38,7 +38,7 @@ class Judgement:
     stage : Stage
         How far it came.
     message : str
-        Of the status line ten seconds after power-on.
+        Message of the status line ten seconds after power-on.
     wrong : list of str
         What must not be.
     """
@@ -65,7 +65,7 @@ def judge(
     message : str
         What the status line said.
     before : Truth
-        Of the card at power-on.
+        Truth of the card at power-on.
     card : Card
         As it is now.
     changed : NDArray[np.int64], shape (n,)

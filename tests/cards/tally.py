@@ -18,9 +18,9 @@ class Result:
     Attributes
     ----------
     seed : int
-        Of `draw`.
+        Seed of `draw`.
     judgement : Judgement
-        Of its flight.
+        Judgement of its flight.
     altered : list of str
         What was done to it.
     """

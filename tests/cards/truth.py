@@ -80,7 +80,7 @@ class Truth:
     fats : list of NDArray[np.uint32]
         Every copy's entries, their upper four bits masked.
     entries : list of Entry
-        Of the root folder, as far as its chain can be followed.
+        Entries of the root folder, as far as its chain can be followed.
     folder_room : bool
         Whether an entry of the root folder is free.
     """

@@ -45,7 +45,7 @@ ROOT = Path(__file__).resolve().parents[2]
 MOST_TIMES, LEAST_S = 20.0, 2.0
 MOST_BYTES, MOST_PER_BYTE = 300_000_000, 8
 WORST = 20
-# Of so many inputs two have their memory traced, one blind and one forged: it takes eight times as
+# Two of so many inputs have their memory traced, one blind and one forged: it takes eight times as
 # long. The limit of the address space holds for every input.
 MEASURED = 40
 SUFFIX = {

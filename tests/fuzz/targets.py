@@ -134,7 +134,7 @@ def fuzz(program: Path, name: str, corpus: Path, *, runs: int, seed: int) -> tup
     program : Path
         As `build` gave it.
     name : str
-        Of the target.
+        Name of the target.
     corpus : Path
         Inputs to begin with; new ones are added.
     runs : int

@@ -288,7 +288,8 @@ def test_lines_survive_garbage_and_any_portions(
 
 
 def test_lines_of_a_stranger_are_refused_or_can_be_shown() -> None:
-    """Of 9000 such lines 147 once passed the parser and ended in errors of the interpreter."""
+    """Some of 9000 such lines once passed the parser and ended in errors of the interpreter:
+    147."""
     random = Random(14)
     words = ("9" * 400, "-1", "1e9", "0x1", "nan", "65536", "-", "missing", "roll", "stale", "1.5")
 

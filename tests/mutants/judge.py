@@ -123,7 +123,7 @@ class Judge:
     Parameters
     ----------
     name : str
-        Of the file in firmware, with its folder: ``core/drive.cpp``, ``drivers/sd_card.h``.
+        Name of the file in firmware, with its folder: ``core/drive.cpp``, ``drivers/sd_card.h``.
     suites : tuple of str
         Its suites in tests/firmware.
     folder : Path

@@ -39,7 +39,7 @@ class Difference:
     largest : int
         Largest difference, raw.
     allowed : int
-        Of one step of the quantity's own resolution.
+        Largest difference allowed: one step of the quantity's own resolution.
     """
 
     channel: str

@@ -88,9 +88,9 @@ class World:
     pressure_pa, air_mps, ground_mps : arrays
         Change of the static pressure; air at the pitots; speed over ground.
     shake, turned : arrays
-        Of the IMU: half-width of its noise in LSB; attitude, 0.01 deg.
+        Motion of the IMU: half-width of its noise in LSB; attitude, 0.01 deg.
     throttle_us : array
-        Of the stick, frame by frame of the receiver.
+        Pulses of the stick, frame by frame of the receiver.
     frozen_from_s : float
         The barometer repeats itself from here on.
     """

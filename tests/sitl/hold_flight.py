@@ -88,13 +88,13 @@ class World:
         As it really is.
     turbulence_mps : float
     gain : (3,) array
-        Of aileron, elevator, rudder: angle for what was commanded.
+        Gains of aileron, elevator, rudder: angle for what was commanded.
     offset_rad : (3,) array
-        Of the surfaces from the trim.
+        Offsets of the surfaces from the trim.
     bank_rad, pitch_rad : float
         At launch, besides the trim's.
     seed : int
-        Of the air.
+        Seed of the air.
     imu : callable
         (time in s, row of the packet's nine values) to the row that is sent; None: nothing is.
     """

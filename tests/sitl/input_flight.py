@@ -54,7 +54,7 @@ class InputFlight:
     analog : (rows, 11) array
         Counts.
     up : (rows,) array
-        Of the pressure sensor.
+        Counts of the pressure sensor.
     place : (epochs, 2) array
         Latitude and longitude, 1e-7 deg.
     gps_sent : (epochs,) array
@@ -62,7 +62,7 @@ class InputFlight:
     button : list of (float, float)
         When it is pressed, and for how long.
     packet_delay_s : float
-        Of every packet, behind its place.
+        Delay of every packet, behind its place.
     apart_us : int
         Rises of two channels; 0: the receiver sends them all at once.
     trigger_s : float

@@ -47,11 +47,11 @@ class CardFlight:
     Attributes
     ----------
     judgement : Judgement
-        Of the card and of the pilot's link.
+        Judgement of the card and of the pilot's link.
     gap_ms : float
         Longest time without a pulse at any servo.
     beats : Beats
-        Of the heartbeat.
+        Beats of the heartbeat.
     """
 
     judgement: Judgement

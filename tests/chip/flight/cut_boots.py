@@ -59,7 +59,7 @@ class GroundWrites:
     Attributes
     ----------
     kilobytes : int
-        Of a cluster.
+        Size of a cluster.
     card : SparseCard
         Before it.
     writes : Journal
@@ -94,11 +94,11 @@ class CutBoot:
     Attributes
     ----------
     kilobytes, write : int
-        Of a cluster; number of the write before which or in which the power went.
+        Size of a cluster; number of the write before which or in which the power went.
     garbage : bool
         Whether that block is garbage.
     beats : Beats or None
-        Of the boot on the chip, if there was one.
+        Beats of the boot on the chip, if there was one.
     wrong : list of str
         What is not as it must be.
     """

@@ -75,7 +75,7 @@ class Flight:
     first_lba : int
         Where the flight's file begins.
     beats : Beats
-        Of the heartbeat.
+        Beats of the heartbeat.
     """
 
     plan: Plan

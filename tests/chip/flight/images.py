@@ -39,7 +39,7 @@ def build_image(environment: str, compiler: str | None = None) -> Path:
     Parameters
     ----------
     environment : str
-        Of platformio.ini: ``mega2560`` or ``arduimu``.
+        Environment of platformio.ini: ``mega2560`` or ``arduimu``.
     compiler : str, optional
         One of ``compilers.TESTED``; the usual one if none is named.
 

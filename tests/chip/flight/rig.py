@@ -108,7 +108,8 @@ class FlightRig:
     card_kind : CardKind
         How the card is addressed.
     threshold_volt : float or None
-        Of the relay's transistor; None: the end of its data sheet that is worse for each movement.
+        Threshold of the relay's transistor; None: the end of its data sheet that is worse for each
+        movement.
     ground_s : float
         IMU and GPS stand still for so long after power-on, then move; 0: it wakes in flight.
     source : callable

@@ -41,7 +41,7 @@ def worst_gap_ms(rig: FlightRig, since: int, *, servos: tuple[str, ...] = SERVOS
 def strange(rig: FlightRig, since: int, servo: str) -> Iterator[tuple[int, int, NDArray[np.int64]]]:
     """Give pulses at a servo that are not within 5 us of one the receiver sent in the last 120 ms.
 
-    Of each its start and width, and the widths sent by then, all in cycles.
+    Each comes with its start and width, and the widths sent by then, all in cycles.
     """
     channel = SERVOS.index(servo)
     sent = np.array([(end - start, end) for c, start, end in rig.receiver.sent if c == channel])

@@ -115,7 +115,7 @@ class Fault:
     after_s : float
         Flown on behind it.
     lossless, engaged : bool
-        Of the Mega.
+        Whether the Mega loses no frame, and whether it is engaged.
     saturated, levelled : tuple of float
         Least and largest part of the samples marked so.
     imu_resets : tuple of int

@@ -22,7 +22,7 @@ class Link:
     match : Match
         Log against truth.
     lost_frames : int
-        Of the log.
+        Frames that the log lacks.
     imu_load, mega_load : float
         Part of the cycles not asleep.
     stack_room, stack_untouched : int

@@ -22,7 +22,7 @@ def swaying(time_s: float, *, seed: int = 1) -> tuple[Array, Array, Array]:
     time_s : float
         Length.
     seed : int
-        Of rhythms and phases.
+        Seed of rhythms and phases.
 
     Returns
     -------

@@ -31,7 +31,7 @@ class ImuBoard:
     mpu_ppm : float
         The sensor's clock against the board's.
     product_id : int
-        Of the sensor.
+        Product id of the sensor.
     over_i2c : bool
         An MPU-6050 on the bus instead of an MPU-6000 on SPI.
     qmc : bool
@@ -39,7 +39,7 @@ class ImuBoard:
     bootloader : bool
         Start in Debian's copy of the board's bootloader.
     seed : int
-        Of noise, jitter and memory at power-on.
+        Seed of noise, jitter and memory at power-on.
     """
 
     def __init__(

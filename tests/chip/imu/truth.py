@@ -20,7 +20,7 @@ class Match:
     made : int
         Samples of the sensor in that time.
     once : int
-        Of these, in the log exactly once.
+        Those of them that are in the log exactly once.
     foreign : int
         Rows of the log whose values are not those of the sample made at their instant.
     error_us : NDArray, shape (n,)

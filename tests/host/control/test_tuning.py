@@ -303,7 +303,7 @@ def test_what_is_drawn_is_there_for_axes_with_gains_alone() -> None:
 
 def test_a_derivative_that_is_known_costs_nothing_and_the_others_follow() -> None:
     covariance = np.array([[4.0, 3.0], [3.0, 9.0]])
-    # Of a normal pair: the variance of the second, given the first, is 9 - 9 / 4.
+    # The variance of the second of a normal pair, given the first, is 9 - 9 / 4.
     assert known(covariance, 0) == pytest.approx(np.array([[0.0, 0.0], [0.0, 6.75]]))
 
 

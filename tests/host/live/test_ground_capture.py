@@ -147,7 +147,7 @@ def test_damaged_head_is_no_head(tmp_path: Path, head: str) -> None:
 def test_a_forged_stream_takes_at_most_eight_times_its_size(
     tmp_path: Path, size: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of the shortest envelopes, and of the shortest frames that are used."""
+    """The shortest envelopes are the worst, and the shortest frames that are used."""
     monkeypatch.setattr("host.wire.stream._WINDOW_BYTES", 1 << 13)
     monkeypatch.setattr("host.wire.stream._AT_ONCE", 1 << 9)
     read_stream_of(tmp_path, joined(SENT))  # what is loaded once

@@ -15,7 +15,7 @@ HEALTHY = range(9200, 9250, 10)  # the first of each ten
 BROKEN = 9300
 PARTS = ("vane", "pot", "pitot", "imu", "gyro", "gps", "baro", "card", "receiver", "supply", "rail",
          "settings", "brown", "watchdog", "telemetry")  # fmt: skip
-# Of the faults of a flight: what it is on the ground; empty: a moment that nobody sees there.
+# What a fault of a flight is on the ground; empty: a moment that nobody sees there.
 LIKE = {
     "card_absent": "card_not_ready", "card_full": "card_not_ready",
     "card_unformatted": "card_not_ready", "card_reject": "card_errors", "card_busy": "",

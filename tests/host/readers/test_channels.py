@@ -127,7 +127,7 @@ def test_flaperons_of_px4() -> None:
 
 
 def test_an_output_stands_until_the_next_pulse() -> None:
-    """Of every second pulse of 50 Hz the one between is on the curve, and each one stands."""
+    """Each second pulse of 50 Hz is on the curve between its neighbours, and each one stands."""
     t = np.arange(0.0, 1.0, 0.04)
     rows, values = held_output(Signal(t, np.where(t < 0.5, 0.0, 1.0), "C2"), 0.02)
     assert values[rows < 0.48 + 0.0199].max() == 0.0

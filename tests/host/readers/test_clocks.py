@@ -197,7 +197,7 @@ def test_all_flights_of_a_log_of_ours_are_its_sessions_with_rows() -> None:
 
 @pytest.mark.parametrize("dated", [True, False])
 def test_midnight_in_text(dated: bool, tmp_path: Path) -> None:
-    """Of a time of the day, and of one with its date."""
+    """A time of the day and one with its date go on alike."""
     rows = logs.table()
     control = read_table(tmp_path / "same.csv", logs.lines(rows))
     start = pd.Timestamp("2026-03-01 23:59:50.5")
@@ -224,7 +224,7 @@ def test_a_changed_bit_is_no_start_of_a_clock() -> None:
         assert epoch_starts([(places, changed)]) == []
     twice = np.concatenate([t_s, t_s])
     every = np.arange(2 * len(t_s))
-    # Of a second kind the first record of the new clock comes sooner.
+    # The first record of the new clock comes sooner if it is of a second kind.
     assert epoch_starts([(10 * every, twice), (10 * every - 7, twice)]) == [9991]
     offset = np.zeros(500)
     offset[200:210] = 3.0  # a burst behind an outage

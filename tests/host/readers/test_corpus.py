@@ -36,7 +36,7 @@ class Right:
         In which `maneuvers`, `identify` and `report` end; `info` and `decode` are for tables 4.
     options : tuple of str
     within : float
-        Of the control's half-width, an estimate from the control's.
+        Share of the control's half-width that an estimate may be from the control's.
     """
 
     control: str

@@ -118,7 +118,7 @@ def test_every_verb_takes_it(
 def test_maneuvers_names_what_the_autopilot_flew(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of a flight with a chirp, an autotune and a doublet by script, as the log names them."""
+    """The flight has a chirp, an autotune and a doublet by script, as the log names them."""
     usual, at_us = ardupilot_log._records, np.arange(8e6, 12e6, 1e5)
     more = [
         Records("SIDD", "Qff", {"TimeUS": at_us, "Time": at_us * 1e-6 - 8.0, "Targ": 0.0 * at_us}),

@@ -203,7 +203,8 @@ def test_integers_of_px4_come_as_the_bytes_of_a_float(tmp_path: Path) -> None:
     typed |= {f"PWM_MAIN_MAX{pin}": 1900 for pin in (1, 2, 4)}
     control = read_autopilot(logs.telemetry(tmp_path / "same.tlog", logs.frames()))
     turned = {k: int(control.log.parameters[f"SERVO{k}_REVERSED"]) for k in (1, 2, 4)}
-    # Of ArduPilot and PX4 alike nose up, roll right and nose right are positive, before a reversal.
+    # Nose up, roll right and nose right are positive for ArduPilot and PX4 alike, before a
+    # reversal.
     typed["PWM_MAIN_REV"] = sum(1 << k - 1 for k, own in turned.items() if own)
     said = []
     number = stamp = 0

@@ -8,7 +8,7 @@ from studies import clean_records
 
 
 def test_a_held_input_drives_as_its_samples_say() -> None:
-    """Of the same seed, the smooth one moves on between them."""
+    """The smooth one of the same seed moves on between them."""
     true = clean_records.AIRCRAFT[1]
     held, smooth = (
         clean_records.flown(kind, true, 0.04, np.random.default_rng(3))

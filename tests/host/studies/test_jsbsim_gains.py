@@ -9,7 +9,7 @@ from host.sysid.models import Trim
 from studies.jsbsim_gains import CASES, STEPS_RAD, closed_loop, problem_of, record
 
 AT = Trim(54.0, 0.01, 0.01)
-# Of a c172p by shares of command, as a record of it said.
+# Answer of a c172p by shares of command, as a record of it said.
 ROLL = UncertainAxis("roll", "roll", AT, ("L_p", "L_da"), np.array([-6.2, 8.9]), np.zeros((2, 2)))
 PITCH = UncertainAxis(
     "pitch", "short-period", AT, ("Z_alpha", "M_alpha", "M_q", "M_de"),

@@ -122,7 +122,7 @@ def test_random_systems_are_stable_and_drawn_as_said() -> None:
     faster = np.log(-poles.real[np.abs(poles.imag) < 1e-9])
     assert np.mean(faster) == pytest.approx(0.0, abs=0.05)
     assert np.std(faster) == pytest.approx(1.0, abs=0.05)
-    # Of four poles the last is real whatever comes; 0.36 of all come in pairs.
+    # The last of four poles is real whatever comes; 0.36 of all come in pairs.
     turning = poles.imag[poles.imag > 1e-9]
     assert np.exp(np.mean(np.log(turning))) == pytest.approx(3.0, rel=0.08)
 

@@ -286,7 +286,7 @@ def test_angles_are_carried_on_by_the_delay_of_their_rates() -> None:
 
 @pytest.mark.parametrize("still", [True, False])
 def test_the_attitude_filter_learns_the_zeros_of_the_gyros_at_rest(*, still: bool) -> None:
-    """Of 20 deg/s it turns for ever (MPU-6000 data sheet); a moving hand is no rest."""
+    """A zero of 20 deg/s turns it for ever (MPU-6000 data sheet); a moving hand is no rest."""
     step_s, resting = 0.005, 1000
     zero = np.radians([20.0, -20.0, 10.0])
     rates = np.tile(zero, (4000, 1))

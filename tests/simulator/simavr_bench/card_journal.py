@@ -103,7 +103,7 @@ class CutCard:
         Parameters
         ----------
         cycle : int
-            Of the cut; not before that of the last call.
+            Cycle of the cut; not before that of the last call.
 
         Returns
         -------

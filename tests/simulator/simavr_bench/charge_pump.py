@@ -28,7 +28,7 @@ class ChargePump:
     Attributes
     ----------
     level : bool
-        Of the pin.
+        Level of the pin.
     coupling_volt, gate_volt : float
         At the time of the last edge.
     """

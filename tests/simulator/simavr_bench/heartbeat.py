@@ -92,7 +92,7 @@ def judge_beats(
     Parameters
     ----------
     cycles, levels : NDArray, shape (n,)
-        Of every edge.
+        Cycle and level of every edge.
     pump : ChargePump
         As it is before the first edge; the worst one unless given.
     until : int or None

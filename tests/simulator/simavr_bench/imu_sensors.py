@@ -98,7 +98,7 @@ class Mpu6000:
         rates_radps, force_mps2 : array_like, shape (n, 3)
             p q r and specific force, body axes x forward, y right, z down.
         temperature_degc : float
-            Of the chip.
+            Temperature of the chip.
         """
         turn = np.array([1.0, -1.0, -1.0])
         force = np.asarray(force_mps2, np.float64) * turn / G0_MPS2

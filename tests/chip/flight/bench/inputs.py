@@ -72,9 +72,9 @@ class InputFigures:
     Attributes
     ----------
     busy_fraction : float
-        Of the chip's time, from the end of the quiet time to the end of the row.
+        Share of the chip's time, from the end of the quiet time to the end of the row.
     width_error_us : NDArray[np.float64], shape (n,)
-        Of every surface pulse of that time against the width commanded as it began.
+        Error of every surface pulse of that time against the width commanded as it began.
     deflected_us : float
         From the narrowest to the widest of those of the elevator, whose stick rests.
     held : bool
@@ -82,7 +82,7 @@ class InputFigures:
     told : int
         Derivatives that were sent by radio.
     untouched_bytes : int
-        Of the stack, since power-on.
+        Bytes of the stack, since power-on.
     frames_lost, stalls : int
     ends : tuple of int
         Reasons of the inputs' ends, from the log.
@@ -166,13 +166,13 @@ def input_rig(
     rate_hz : int
         100 or 200.
     frame_s : float
-        Of the receiver, channels one after the other.
+        Frame of the receiver, channels one after the other.
     duration_s : float
-        Of the row, behind its quiet time; 19.8 at most.
+        Length of the row, behind its quiet time; 19.8 at most.
     folder : Path
         Where the card's image goes.
     seed : int
-        Of the flight.
+        Seed of the flight.
     holds : bool
         The row holds two axes; behind the sign come the tilts.
     """

@@ -81,7 +81,7 @@ class Output:
     Attributes
     ----------
     width_error_us : NDArray[np.float64], shape (n,)
-        Of every servo pulse against the nearest width accepted in the last 100 ms.
+        Error of every servo pulse against the nearest width accepted in the last 100 ms.
     strange : int
         Servo pulses that are not within 1 us of such a width.
     delay_ms : NDArray[np.float64], shape (m,)

@@ -29,7 +29,7 @@ class BadCard:
     make : callable
         Makes the image.
     flashes : int
-        Of LED and buzzer in a group.
+        Flashes of LED and buzzer in a group.
     prepare : callable
         Done to the rig before power-on.
     """

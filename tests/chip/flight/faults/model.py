@@ -65,7 +65,7 @@ class Seen:
     begin, end, over : int
         Cycles: the fault began, was undone, the flight ended.
     events : list of Event
-        Of the whole log; times are of the clock of their boot.
+        Events of the whole log; times are of the clock of their boot.
     journal : Journal
         What the card programmed.
     """

@@ -56,7 +56,7 @@ def test_without_a_mark_of_the_derivative_there_is_none(answer: Answer) -> None:
 
 @pytest.mark.parametrize(("share", "mark"), [(0.05, TRUSTED), (0.15, CAREFUL), (0.4, UNSURE)])
 def test_table_json_and_screen_say_it(answer: Answer, share: float, mark: str) -> None:
-    """Of a derivative under trust, whose coefficient mass and inertia widen."""
+    """The derivative is under trust; mass and inertia widen its coefficient."""
     wide = _with(answer, share)
     verdict = verdict_of(wide)
     table = estimate_table([wide], None, [verdict])

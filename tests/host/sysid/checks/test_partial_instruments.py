@@ -287,7 +287,7 @@ def trainer() -> pd.DataFrame:
 @pytest.mark.parametrize(
     ("columns", "model", "known"),
     [
-        # Of one axis: M_q was known to 43 %, N_p to 35.
+        # One axis alone: M_q was known to 43 %, N_p to 35.
         ((*LONGITUDINAL, "ax_mps2", "alpha_rad"), "longitudinal", {"M_alpha": 0.05, "M_q": 0.08}),
         (LATERAL_COLUMNS, "lateral", {"L_p": 0.06, "N_beta": 0.06, "N_p": 0.4}),
         # Without a vane, by one accelerometer: refused before. The airspeed's scale is in them.

@@ -46,7 +46,7 @@ def glided() -> dict[str, Array]:
 
 @pytest.mark.parametrize("without", [(), ("airspeed_mps",), ("airspeed_mps", "theta_rad")])
 def test_a_right_angle_of_attack_is_not_turned_round(without: tuple[str, ...]) -> None:
-    """Of alpha and elevator alone, what they left of q turned the other way (-1.45 to -0.37)."""
+    """What alpha and elevator alone left of q turned the other way (-1.45 to -0.37)."""
     record = {name: v for name, v in glided().items() if name not in without}
     assert consistent(record, DT_S) == []
 

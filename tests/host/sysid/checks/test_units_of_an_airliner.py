@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 Columns = dict[str, np.ndarray]
 SPEED_MPS, ALPHA_RAD, STEP_S, GUST_MPS, GUST_M = 130.0, 0.056, 0.02, 0.5, 150.0
-# Of beta, p, r, phi by these; by gusts, rudder, aileron.
+# Rates of beta, p, r, phi by these; by gusts, rudder, aileron.
 A = np.array(
     [
         [-0.104, 0.056, -0.998, GRAVITY_MPS2 / SPEED_MPS],

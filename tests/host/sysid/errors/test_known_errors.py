@@ -29,7 +29,7 @@ SEED = 24310
 # The aircraft is not linear: in pitch that may be said.
 @pytest.mark.parametrize(("axis", "may_be_said"), [("longitudinal", True), ("lateral", False)])
 def test_a_right_flight_in_calm_air_stays_under_trust(axis: str, may_be_said: bool) -> None:
-    """Of six lateral flights three had lost N_beta, five were accused."""
+    """Three of six lateral flights had lost N_beta, five were accused."""
     identified = answer_with_file(Air(), SEED, axis)
     [(answer, verdict)] = [
         (a, v)

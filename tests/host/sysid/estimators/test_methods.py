@@ -138,5 +138,5 @@ def test_inflation_is_power_times_the_time_a_correlation_lasts() -> None:
         4.0, rel=0.05
     )
     slow = signal.lfilter([1.0], [1.0, -0.8], white, axis=0)
-    # Of an AR(1) process: its variance times (1 + a) / (1 - a), which is 1 / (1 - a)^2.
+    # The factor of an AR(1) process: its variance times (1 + a) / (1 - a), which is 1 / (1 - a)^2.
     assert innovation_inflation([slow]) == pytest.approx(25.0, rel=0.15)

@@ -64,7 +64,7 @@ def test_a_short_dutch_roll_holds_the_truth_though_wings_roll(length_s: float) -
 
 @pytest.mark.parametrize("length_s", [3.0, 5.0])
 def test_noise_of_the_roll_rate_takes_no_yaw_by_rolling_for_known(length_s: float) -> None:
-    """Of another simulator's aircraft N_beta was 8 to 15 % large, known to 10 under "trust"."""
+    """N_beta of another simulator's aircraft was 8 to 15 % large, known to 10 under "trust"."""
     aircraft = short_records.fleet()["other trainer"]
     seed = 25100
     columns, window = short_records.record(aircraft, 0.0, "dutch-roll", length_s, seed)
@@ -117,7 +117,7 @@ def test_side_gusts_are_a_state_of_a_short_dutch_roll(name: str) -> None:
     assert found.method == "filter-error-gust"
     assert_held(found.result, truth, YAW, times=1.1)
     assert verdict_of(found).marks["N_dr"] in RELIED_ON
-    # Of one deviation of N_p alone, which nothing tells better than its prior.
+    # One deviation of N_p alone makes it so wide: nothing tells N_p better than its prior.
     half = found.result.half_width()
     assert half[found.result.index("N_beta")] > 0.1 * truth["N_beta"]
 

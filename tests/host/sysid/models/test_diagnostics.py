@@ -161,7 +161,7 @@ def test_small_parameters_are_measured_by_what_would_matter() -> None:
 
 
 def test_a_state_that_nobody_measured_sets_no_scale() -> None:
-    """Of a user's `w` the unit is not known: M_q and M_de were "small" beside it."""
+    """The unit of a user's `w` is not known: M_q and M_de were "small" beside it."""
     model = model_from(
         {
             "name": "hidden",

@@ -12,7 +12,7 @@ from scipy import optimize
 
 @dataclass
 class Residuals:
-    """Of a trial, and half their squares."""
+    """Residuals of a trial, and half their squares."""
 
     values: Array
     cost: float
