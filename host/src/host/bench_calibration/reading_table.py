@@ -1,8 +1,8 @@
 """Held positions from a CSV table, and the empty table to fill in.
 
 Columns: `channel` (may be missing where one is meant), `repeat` (1 without it), `position` (in the
-unit of the tool), and `counts`, or one column per channel that was read at the same time. Of a
-pressure that was held to see a leak: `counts_after` and `seconds`.
+unit of the tool), and `counts`, or one column per channel that was read at the same time. A
+pressure that was held to see a leak has `counts_after` and `seconds`.
 """
 
 from __future__ import annotations

@@ -160,9 +160,9 @@ def height_loop(
 ) -> Callable[[float, Array, Mapping[str, Spectra]], Spectra]:
     """Return TECS' loop at the demanded pitch, throttle at rest.
 
-    With E = g h - V v of height h and speed error v: the pitch asked is that of
-    (1 + d) E / T + d E' + I integral(E / T + E') - integral(V v) / T, over V g. Of v' only what is
-    faster than T counts.
+    With E = g h - V v of height h and speed error v: the pitch asked is that of (1 + d) E / T + d
+    E' + I integral(E / T + E') - integral(V v) / T, over V g. What counts of v' is what is faster
+    than T.
     """
     t = time_constant_s
 

@@ -43,7 +43,7 @@ class ReplaySource:
         Flight seconds per second; infinite as fast as it is decoded.
     rate_hz : float, optional
         Identification frames a second of a log of the card, the radio's without it; a capture is
-        played as received. Of rows of text as they were printed; without it GPS tells.
+        played as received. Rows of text a second as they were printed; without it GPS tells.
     """
 
     path: Path

@@ -165,7 +165,7 @@ def linear_widths(table: pd.DataFrame, aircraft: str) -> dict[str, FlightWidth]:
     """Return the intervals of the default linear method for one flight, as of `host identify`.
 
     With GPS, as every log has it: without, vanes' delays stay as open as their calibration left
-    them and the clock's scale too, and M_q of the demo card was promised to 14 % in place of 9.
+    them and the clock's scale too, and M_q of the demo card is promised to 14 % in place of 9.
 
     Raises
     ------

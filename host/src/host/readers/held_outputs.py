@@ -3,7 +3,7 @@
 Where outputs are logged less often than they change, the missing pulses are interpolated by the
 cubic through four records, and each is held until the next one. Straight lines through the records
 would move a surface before its command, by 10 ms where every second of 50 pulses a second is
-logged. Held pulses on a straight line lose 3.5 % of a motion of 3 Hz, which made Cm_alpha and
+logged. Held pulses on a straight line lose 3.5 % of a motion of 3 Hz, which makes Cm_alpha and
 Cm_de 9 % large; on the cubic they lose 0.4 %.
 """
 

@@ -2,8 +2,8 @@
 
 A log says so itself. A table that `host decode` wrote shows it: a surface is measured where its
 column is that of its pots, or what somebody made of them since, which is more like them than like
-the command; and the clock is checked where GPS spoke for long enough. Of a table of others nothing
-is known: its surfaces count as measured, unless its map calls them commands, and its clock as
+the command; and the clock is checked where GPS spoke for long enough. Nothing is known of a table
+of others: its surfaces count as measured, unless its map calls them commands, and its clock as
 right.
 """
 

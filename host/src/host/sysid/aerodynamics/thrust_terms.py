@@ -1,7 +1,7 @@
 """Thrust that was measured and changed: a force added to the linear model, caused by no state.
 
-Without it a step of thrust passes for what airspeed and gusts do: of an airliner in calm air whose
-thrust stepped by a quarter M_alpha was -1.5 +- 7.5, truth -5.8. How much it pulls is known over the
+Without it a step of thrust passes for what airspeed and gusts do: M_alpha of an airliner in calm
+air whose thrust steps by a quarter is -1.5 +- 7.5, truth -5.8. How much it pulls is known over the
 mass of an aircraft file, and estimated without. By how much it lifts and pitches (its line of
 action, the slipstream) nobody knows: that is estimated along. Where it turns with the aircraft its
 mean counts, which is in Z_alpha.

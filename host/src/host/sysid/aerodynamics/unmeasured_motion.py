@@ -1,7 +1,7 @@
 """What departures from a trim need and nobody measured.
 
-A table of one axis lacks the columns of the other. Left out, everything that airspeed does passed
-for noise: of a trainer's 3-2-1-1s in calm air M_q was known to 43 % and nothing of its forces
+A table of one axis lacks the columns of the other. Left out, everything that airspeed does passes
+for noise: by a trainer's 3-2-1-1s in calm air M_q is known to 43 % and nothing of its forces is
 trusted; with wings level in place of what is missing M_q is known to 2 %. An angle without a vane
 is what its accelerometer says at the model that was fitted.
 """

@@ -182,7 +182,7 @@ class VaryingModel:
 
     def _moving(self, values: Array) -> Array:
         """Return an input between its samples: its mean, held; on a line what a reduced template
-        leaves out, for half a sample of that is as much as N_r was off by, 2 %."""
+        leaves out, for half a sample of that puts N_r 2 % off."""
         on_line = bool(self.left_out) and self.base.hold == "foh"
         return values if on_line else _neighbour_means(values)
 
@@ -337,7 +337,7 @@ class VaryingModel:
             "az_mps2": angle * (cosine * f - sine * n) + bent * (sine * f0 + cosine * n0),
         }
         # A maneuver flown faster than the trim has its lift by less angle of attack, and so less of
-        # it by airspeed; left out, az had 5 times its noise along the inputs in calm air.
+        # it by airspeed; left out, az has 5 times its noise along the inputs in calm air.
         own = np.mean(normal / ratio**2) - self._lift_by_airspeed
         by_airspeed = {"ax_mps2": -2.0 * own * sine, "az_mps2": 2.0 * own * cosine}
         return [

@@ -18,7 +18,7 @@ def leaning_on(model: LinearModel, signals: Collection[str]) -> set[str]:
     ----------
     model : LinearModel
     signals : collection of str
-        States, inputs or outputs. Of an output that is no state (an accelerometer) the parameters
+        States, inputs or outputs. The parameters of an output that is no state (an accelerometer)
         are those whose largest gain is there: D_alpha of ax, Z_alpha of az.
     """
     found = set()

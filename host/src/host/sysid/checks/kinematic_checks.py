@@ -1,10 +1,10 @@
 """Identities of motion that hold for every aircraft: a column in another unit breaks them.
 
 How an angle turns follows from the rates, how the wind angles and the speed change from the rates
-and the specific force. Each column that moves one of them must do so with a factor of one. Noise
-on either side only widens the range of factors that a regression allows, from both directions;
-what lies outside as a whole is a unit, a scale, a sign or another clock. Of speed against forward
-force it may as well be thrust that a sensor does not feel, wind that changes with height, or a slow
+and the specific force. Each column that moves one of them must do so with a factor of one. Noise on
+either side only widens the range of factors that a regression allows, from both directions; what
+lies outside as a whole is a unit, a scale, a sign or another clock. Between speed and forward force
+it may as well be thrust that a sensor does not feel, wind that changes with height, or a slow
 pitot. Gusts change angles and speed as no force says; what surfaces drive is judged apart.
 """
 
@@ -116,7 +116,7 @@ def _without_gusts(law: Identity) -> Iterator[Factor]:
 
     An aircraft turns into the gusts that turn its wind angles, slower than they do: a rate that
     only answers them explains little of the angle, and the slope between both is no scale. An
-    airliner's sideslip of a flight without rudder moved 2.3 to 2.7 times as fast as its yaw rate.
+    airliner's sideslip of a flight without rudder moves 2.3 to 2.7 times as fast as its yaw rate.
     """
     gusty = law.opposed < -SIGN_CORRELATION and not law.driven
     return (f for f in factors(law) if not gusty or f.explained >= UNDRIVEN_EXPLAINED)

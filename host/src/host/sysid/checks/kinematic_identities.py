@@ -153,7 +153,7 @@ def _slow(m: Mapping[str, Array]) -> Iterator[Identity]:
         known = GRAVITY_MPS2 * fall + np.sin(alpha) * m["az_mps2"]
         known = known + _shear(_law("airspeed_mps", m, along, (climb,), known=known)) * climb
         # An IMU that is tilted in the aircraft lets lift and side force lean into ax. Vanes show
-        # the angle; without them 1.7 deg made speed move 1.5 times as fast as ax said.
+        # the angle; without them 1.7 deg make speed move 1.5 times as fast as ax says.
         lean = (m["az_mps2"], m.get("ay_mps2", zero))
         tilted = list(factors(_law("airspeed_mps", m, along, lean, known=known)))
         right = bool(tilted) and all(map(may_be_one, tilted))

@@ -210,7 +210,7 @@ def _surfaces(means: Mapping[str, Array]) -> list[Finding]:
 def _exchanged(means: Mapping[str, Array]) -> list[Finding]:
     """Hold each surface against the rate that another one should drive.
 
-    A mixer or a dihedral lets a surface drive two rates. Of two columns each of which drives the
+    A mixer or a dihedral lets a surface drive two rates. Where each of two columns drives the
     other's rate more than its own, one stands under the other's name.
     """
     names = [s for s in SURFACES if s in means and SURFACES[s][0] in means]

@@ -45,8 +45,8 @@ from host.sysid.numerics.maneuver_agreement import ManeuverAgreement, scatter_te
 
 # One deviation of the error that instrumental variables leave, as a share of what they moved. A
 # roll rate follows the aileron so closely that they are weak: on fourteen flights of an independent
-# simulator whose air rolls at 0.5 and 1 m/s Cl_p went from 0.08 to 0.24 of the truth by least
-# squares to 0.65 to 0.99. In light turbulence they move it by 7 %.
+# simulator whose air rolls at 0.5 and 1 m/s Cl_p is 0.08 to 0.24 of the truth by least squares, and
+# 0.65 to 0.99 by them. In light turbulence they move it by 7 %.
 MOVED_SHARE = 0.25
 LEAST_MOVED = 0.3  # of a coefficient: below, air neither pitches nor rolls
 MOVED_BY_AIR = ("Cm_alpha", "Cm_q", "Cl_p", "Cl_da", "Cn_beta", "Cn_r")

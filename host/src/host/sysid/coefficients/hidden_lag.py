@@ -1,11 +1,11 @@
 """Test whether surfaces that lag behind their columns move the coefficients of a moment.
 
-The spectrum of the residual is what weighs it: an unknown lag makes it large where the lag
-acts, and passes for noise. With 50 ms of it Cm_alpha, Cm_de and Cl_p err by 42 to 55 %, known to
-4. To first order a lag is the slope of a surface, one more column next to the terms of an equation:
-how it moves them says whether it matters, a one-sided test whether it is there: a surface ahead of
-its column is no lag (the demonstration's aileron seems 5 ms early, by 3 deviations). Instrumental
-variables keep gusts out: by least squares Cl_p of a right flight in 0.5 m/s was accused.
+The spectrum of the residual is what weighs it: an unknown lag makes it large where the lag acts,
+and passes for noise. With 50 ms of it Cm_alpha, Cm_de and Cl_p err by 42 to 55 %, known to 4. To
+first order a lag is the slope of a surface, one more column next to the terms of an equation: how
+it moves them says whether it matters, a one-sided test whether it is there: a surface ahead of its
+column is no lag (the demonstration's aileron seems 5 ms early, by 3 deviations). Instrumental
+variables keep gusts out: by least squares Cl_p of a right flight in 0.5 m/s is accused.
 """
 
 from __future__ import annotations

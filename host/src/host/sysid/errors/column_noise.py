@@ -1,9 +1,9 @@
 """Noise of measured columns that drive a user's equations: what output error leaves uncounted.
 
 Output error takes inputs for true. Rates and specific forces that drive a path carry noise, which
-the states add up: the zero of the gyro was held in 5 of 8 flights. Columns are drawn anew with
-noise as large as their own, and how far the estimate moves counts in its covariance. A filter's
-process noise stands for it already.
+the states add up: without, intervals of the gyro's zero hold in 5 of 8 flights. Columns are drawn
+anew with noise as large as their own, and how far the estimate moves counts in its covariance. A
+filter's process noise stands for it already.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 """Motion of surfaces between samples: as servos move, along lines, or held.
 
-Where an instrument's file says how they were measured they move, kinks included (`input_kinks`).
-Of a table of others the data may say: how far from lines to that motion is one more parameter of
-white output error, with its delays. Where they do not, and in gusts they do not, surfaces move
-as servos do. A line cuts the bends of a servo off: at 50 Hz L_p is 0.8 % small by it and L_da
-0.9 % large, known to 0.7; at 100 Hz M_alpha is 0.4 % large, known to 1.4. Of surfaces that are
-held (a simulator without a servo) a line is half a sample early, and every sensor seems late: at
-50 Hz the IMU by all of its bound.
+Where an instrument's file says how they were measured they move, kinks included (`input_kinks`). In
+a table of others the data may say: how far from lines to that motion is one more parameter of white
+output error, with its delays. Where they do not, and in gusts they do not, surfaces move as servos
+do. A line cuts the bends of a servo off: at 50 Hz L_p is 0.8 % small by it and L_da 0.9 % large,
+known to 0.7; at 100 Hz M_alpha is 0.4 % large, known to 1.4. For surfaces that are held (a
+simulator without a servo) a line is half a sample early, and every sensor seems late: at 50 Hz the
+IMU by all of its bound.
 """
 
 from __future__ import annotations

@@ -204,8 +204,8 @@ def fit_gust_state(
         )
     if before is not None:  # sensors that were late then have another noise now
         return fit_gust_state(model, maneuvers, airspeed_mps, start, roughly=roughly)
-    # Output error has wider intervals, but a search that has not converged has none.
-    # It starts afresh: where the filter got lost a search would too (M_alpha -13000 of -90).
+    # Output error has wider intervals, but a search that has not converged has none. It starts
+    # afresh: where the filter gets lost a search would too (M_alpha -13000 of -90).
     result = fit("output-error-white", model, maneuvers, multiple_starts=False)
     return replace(
         result,

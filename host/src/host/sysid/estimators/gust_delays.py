@@ -1,8 +1,8 @@
 """Delays of the sensors, estimated by filter error with the gust.
 
 Output error takes the gust for noise of the sensors. What a gust does to vane, gyro and
-accelerometers then passes for delays: on simulated flights without any, gusts of 1 m/s, it found 16
-ms of the vane and 4 ms of the IMU, and M_alpha was 6 to 10 % off by that, M_q 17 %. A filter that
+accelerometers then passes for delays: on simulated flights without any, gusts of 1 m/s, it finds 16
+ms of the vane and 4 ms of the IMU, and M_alpha is 6 to 10 % off by that, M_q 17 %. A filter that
 has the gust tells both apart.
 
 A delay tau of output y enters as y - tau dy/dt, with dy/dt = C (A x + B u) + D du/dt of the

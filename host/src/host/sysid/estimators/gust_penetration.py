@@ -23,7 +23,7 @@ ROLL_LAG = "gust_roll_lag_radps"
 TURNED = (("alpha_rad", "q_radps"), ("beta_rad", "r_radps"))  # angles and their rates
 ROLL_STATES = frozenset({"beta_rad", "p_radps"})  # of a model that air may roll
 # The air turns within the time to fly this far, a tail arm or more, and rolls within 4 b/pi
-# (MIL-F-8785C, 3.7.5) of models of 1.2 to 2.5 m span. At the lower end of that range the prior made
+# (MIL-F-8785C, 3.7.5) of models of 1.2 to 2.5 m span. A prior at the lower end of that range makes
 # the lag of the rolling gust 1.8 % quick and L_p 0.5 % small on a trainer of 1.8 m.
 LENGTH_M, ROLL_LENGTH_M, LENGTH_SHARE = 1.5, 2.2, 0.5
 FARTHEST = 10.0  # times more or less: bounds of the search

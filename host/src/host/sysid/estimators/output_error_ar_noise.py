@@ -224,7 +224,7 @@ def _fit_ar_models(
             residuals = [r[j] for r in optimum.residuals]
             power = sum(float(e @ e) for e in residuals) / problem.counts[j]
             # What a clean column leaves is the input between its samples: smooth, and driven by the
-            # least noise such a memory widened intervals to 70 000 %.
+            # least noise such a memory widens intervals to 70 000 %.
             if clean[j] or power <= problem.clean_variance[j]:
                 selected[j] = 0
                 updated.append(ArNoise.white())

@@ -2,12 +2,12 @@
 
 The delay is estimated jointly with a model's parameters by its profile likelihood: a fit of all
 parameters at each of some delays, the prior of the delay added, a parabola about the best. It is
-the same for every method and needs no start. Linearised about the last delay the fit took the
-input's rate for a lead and went to where the prior is.
+the same for every method and needs no start. Linearised about the last delay the fit takes the
+input's rate for a lead and goes to where the prior is.
 
 What output error leaves is weighed as noise with a memory. Gusts are slow, a delay shows at the
-edges of the inputs: as white noise the gusts hid it there (0.5 m/s, no vanes: -7 to 13 ms of 2,
-and L_p went with it by 4 % a millisecond), whitened it is known to 2 ms.
+edges of the inputs: as white noise the gusts hide it there (0.5 m/s, no vanes: -7 to 13 ms of 2,
+and L_p goes with it by 4 % a millisecond), whitened it is known to 2 ms.
 
 Bandwidth and rate limit are carried: 1 / (2 pi f) is a delay too, and a free bandwidth with a
 free delay draws the filter to 3.5 Hz on thor75, where 6 Hz and 50 ms are published.
@@ -185,8 +185,8 @@ def _least(profile: DelayProfile, step: float) -> tuple[float, float, float, flo
     """Return the delay of the least cost by a parabola, the delay asked next to it, the step, and
     the curvature.
 
-    The step shrinks until the parabola is no wider than what it tells: in calm air one over
-    steps of 13 ms was 8 ms off, by five of its half-widths.
+    The step shrinks until the parabola is no wider than what it tells: in calm air one over steps
+    of 13 ms is 8 ms off, by five of its half-widths.
     """
     while True:
         for _ in range(8):

@@ -3,9 +3,9 @@
 Air that rolls drives the roll rate by far more than a gyro's noise at any frequency, so a filter
 reads the aircraft's dynamics from samples next to each other. Between these our log has the gyro's
 low-pass and a straight line to the instant of the row: what is missing there passes for the
-aircraft. On recorded flights L_p and L_da came out 15 and 14 % small at a step of 10 ms, and 9 and
+aircraft. On recorded flights L_p and L_da come out 15 and 14 % small at a step of 10 ms, and 9 and
 6 % with perfect sensors and [1 2 1] / 4 over all columns alike; within 2 % at 20 ms. Means take the
-same off inputs and outputs, which to a linear model is no error. Of a slow sensor the mean is that
+same off inputs and outputs, which to a linear model is no error. The mean of a slow sensor is that
 of the curve through its samples. Where the roll rate itself is slow, the gusts in between are in no
 curve: its record stays with output error.
 

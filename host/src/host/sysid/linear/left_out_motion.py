@@ -1,8 +1,8 @@
 """A reduced template fitted with the measured motion that it leaves out.
 
-Its own parameters are then those of the whole aircraft, and what is not known of the terms left
-out is in their intervals. On records of 1.5 to 5 s of a trainer N_beta of `dutch-roll` was 16 to
-18 % large without, known to 2, and L_p of `roll` 30 to 38 %, known to 35.
+Its own parameters are then those of the whole aircraft, and what is not known of the terms left out
+is in their intervals. On records of 1.5 to 5 s of a trainer N_beta of `dutch-roll` is 16 to 18 %
+large without, known to 2, and L_p of `roll` 30 to 38 %, known to 35 (`studies.short_records`).
 """
 
 from __future__ import annotations
@@ -122,9 +122,9 @@ def _where_gusts_are(
 
     It is to explain them decisively better than white noise does, both on the same data, delays of
     output error taken out: a line between samples has less noise than they. In calm air 0 of 108
-    records of linear aircraft showed gusts, and of a virtual flight, which is not linear, 0.06 m/s.
-    Noise with a memory is no rival: it explained the gusts of a recorded flight better, where N_dr
-    was then known to 106 %, by the filter to 4.
+    records of linear aircraft show gusts, and a virtual flight, which is not linear, 0.06 m/s.
+    Noise with a memory is no rival: it explains the gusts of a recorded flight better, and N_dr is
+    then known to 106 %, by the filter to 4.
     """
     late = {d.name: wide.value(d.name) for d in model.delays}
     shifted = [advance_outputs(m, model, late) for m in data]

@@ -1,8 +1,8 @@
 """How long a maneuver goes on: from the rest before its input to the next thing that moves it.
 
 What follows an input with the surfaces at rest is the aircraft's own motion. The phugoid is in
-nothing else: cut off three seconds after the input, D_V of a linear record was known 30 times worse
-than it could be.
+nothing else: cut off three seconds after the input, D_V of a linear record is known 30 times worse
+than it can be.
 """
 
 from __future__ import annotations

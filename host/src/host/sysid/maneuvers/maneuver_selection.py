@@ -155,7 +155,7 @@ def joined_windows(
 
     Windows that share samples are one. Those that only touch, the aircraft left alone between them,
     stay apart where one can be held out and predicted; else they are one too, for a window costs
-    constants of its own (yaw derivatives of a calm record were known up to 1.5 times worse).
+    constants of its own (yaw derivatives of a calm record are known up to 1.5 times worse).
     """
     joined = [merge_overlapping(found) for found in each]
     axes = [item.axis for found in joined for item in found]

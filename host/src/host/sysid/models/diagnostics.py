@@ -117,8 +117,8 @@ def reference_values(
     """Return the value that each parameter's error is compared with.
 
     It is |parameter|, or, where its contribution (|parameter| times rms of its regressor) is below
-    5 % of the largest of its equation, the value that would contribute 5 %. Of a tied parameter the
-    equation with its largest contribution decides. Regressors are taken about their mean, because
+    5 % of the largest of its equation, the value that would contribute 5 %. The equation with the
+    largest contribution of a tied parameter decides. Regressors are taken about their mean, because
     the trim carries no information. With a `small_share` of zero the value is always |parameter|.
 
     Parameters
@@ -217,7 +217,7 @@ class Identifiability:
     probability : float
         Probability that some bound exceeds 100 % of its value.
     flags : tuple of Refusal
-        Both grades, in the order of the model. Of an identifiable fit they can only be weakly
+        Both grades, in the order of the model. Those of an identifiable fit can only be weakly
         identifiable; of another one at least one of them is not identifiable.
     """
 

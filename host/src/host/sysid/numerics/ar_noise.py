@@ -69,7 +69,7 @@ def autocovariance(coefficient: Array, lags: int) -> Array:
 
     By the Levinson-Durbin recursion (Kay, Modern Spectral Estimation, ch. 6), down to the
     reflection coefficients and up again. With these within one it is positive definite whatever
-    rounding does: of poles next to one the Yule-Walker equations gave a negative variance.
+    rounding does: of poles next to one the Yule-Walker equations give a negative variance.
 
     Parameters
     ----------
@@ -191,8 +191,8 @@ def lagged_moments(
 def fit_ar(moments: Array, order: int) -> tuple[Array, float]:
     """Return AR coefficients and the sum of squared innovations from lagged moments.
 
-    The coefficients solve the normal equations (Yule-Walker equations of the moments). Of a
-    residual that is rounding alone, or a straight line, they are singular: it counts as white.
+    The coefficients solve the normal equations (Yule-Walker equations of the moments). They are
+    singular for a residual that is rounding alone, or a straight line: it counts as white.
     """
     if order == 0:
         return np.zeros(0), float(moments[0, 0])

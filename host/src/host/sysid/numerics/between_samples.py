@@ -130,8 +130,8 @@ def left_between_samples(
 ) -> BoolArray:
     """Return of which outputs a fit leaves what inputs may have done between samples, (p,).
 
-    That is no noise. Taken for noise with a memory it whitened the motion away: M_alpha of records
-    without noise was up to 970 times its value, where inputs were held and the model draws lines.
+    That is no noise. Taken for noise with a memory it whitens the motion away: M_alpha of records
+    without noise is up to 970 times its value, where inputs were held and the model draws lines.
 
     Parameters
     ----------

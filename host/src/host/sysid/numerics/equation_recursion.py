@@ -36,7 +36,7 @@ class SampledEquations(NamedTuple):
         Not yet late: what rates see where inputs are held.
     shift : Array, shape (m,)
         Samples that `held` is late by. A step ends where one jumps: spread over its sample, a
-        command 30 ms late was found 34.5 ms late, of records of 20 and 40 ms a sample.
+        command 30 ms late is found 34.5 ms late, of records of 20 and 40 ms a sample.
     by_delay : Array, shape (samples, m)
         Slopes of each input by its delay.
     input_column : IntArray, shape (m,)

@@ -36,7 +36,7 @@ def outputs_at(
     """Write outputs of sample `k` into `y` (p,) and their slopes by the state into `H` (p, n).
 
     `by_y` (p, L) and `by_H` (p, n, L) are slopes by the unknowns, of `y` those through `x` too.
-    What was not `seen` may be left. Of a model.
+    What was not `seen` may be left. Every model has its own.
     """
     raise NotImplementedError
 

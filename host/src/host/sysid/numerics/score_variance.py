@@ -32,7 +32,7 @@ def white_fit_covariance(
     """Return the covariance of white output error in noise with a memory.
 
     M^-1 (sum S' R S + P) M^-1 with R of the noise, not of the residuals: these lack what the
-    parameters took, slow gusts most (M_q of two maneuvers in 0.5 m/s: 38 of 50 intervals held).
+    parameters took, slow gusts most (M_q of two maneuvers in 0.5 m/s: 38 of 50 intervals hold).
 
     Parameters
     ----------

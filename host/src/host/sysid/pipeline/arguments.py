@@ -82,7 +82,7 @@ def stretches_of(given: Any, flights: int) -> list[tuple[TimeSpan, ...]]:
     Parameters
     ----------
     given : pair, list of pairs, or a list with one of these (or None) for each flight
-        From and to, s; None is the end of the record. Of one flight the outer list may be left out.
+        From and to, s; None is the end of the record. One flight needs no outer list.
     flights : int
 
     Raises

@@ -268,7 +268,7 @@ def _late_inputs(path: Path) -> dict[str, float]:
 def _as_delayed(columns: Mapping[str, Array], late_s: Mapping[str, float]) -> dict[str, Array]:
     """Return the columns, inputs as late as the model has them.
 
-    A servo of 40 ms was left out, and q_radps of the record fitted differed by 25 in place of 4 %.
+    Without a servo of 40 ms q_radps of the record fitted differs by 25 in place of 4 %.
     """
     t_s = columns["t_s"]
     late = {n: np.interp(t_s - s, t_s, columns[n]) for n, s in late_s.items() if n in columns}

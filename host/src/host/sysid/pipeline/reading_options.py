@@ -119,8 +119,8 @@ def joined_stretches(
 ) -> tuple[list[int], list[ReadingOptions]]:
     """Return which sources differ, and how each is read: with the stretches of its repetitions.
 
-    A source that is given again with stretches of its own has further stretches. Of one without
-    the same samples would be fitted twice: it stays apart, and is refused.
+    A source that is given again with stretches of its own has further stretches. Given again
+    without, the same samples would be fitted twice: it stays apart, and is refused.
     """
     kept: list[int] = []
     joined: list[ReadingOptions] = []

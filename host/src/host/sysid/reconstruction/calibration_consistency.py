@@ -27,9 +27,9 @@ OBSERVABLE_GROUPS: dict[str, tuple[str, ...]] = {
 }
 ALL = "all"  # name of the test of all groups together
 SIGNIFICANCE = 0.01  # of the test: how often a correct file may be rejected
-# Reduction of the prior variance from which a direction counts. Below a half an estimate rests
-# on the prior, and noise larger than reckoned shows: the vanes' height from the IMU, known to 0.4,
-# was off by 2.0 times what file and noise allow (55 flights), all others by 1.0 to 1.2.
+# Reduction of the prior variance from which a direction counts. Below a half an estimate rests on
+# the prior, and noise larger than reckoned shows: the vanes' height from the IMU, known to 0.4, is
+# off by 2.0 times what file and noise allow (55 flights), all others by 1.0 to 1.2.
 LEAST_INFORMATION = 0.5
 
 

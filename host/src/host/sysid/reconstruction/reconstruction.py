@@ -38,7 +38,7 @@ POSTERIOR_PRIOR_RATIO = 0.7
 CONTRADICTION_SD = 3.0  # apart by more, the vanes are not those of the file
 VANE_MODEL_SD = 0.006  # of scale: dry friction known to 20 % of its 3 %
 # Without GPS only vanes and pitot, gusts included, determine the path: on eight flights rms errors
-# were up to 2.5 times the computed deviations, more for biases of the gyro.
+# are up to 2.5 times the computed deviations, more for biases of the gyro.
 NO_GPS_INFLATION = 2.5
 GYRO_ZEROS = UNOBSERVABLE_WITHOUT_GPS = INERTIAL[0:3]
 REASONS = {
@@ -260,9 +260,9 @@ def _tests_without_gps(
 ) -> tuple[ConsistencyTest, ...]:
     """Return the tests of the file by what is estimated without GPS.
 
-    The zero of the alpha vane comes with the IMU's, and what comes out as a gyro's bias is off
-    by as much again as the file says (in calm air 2.1 mrad/s about q of 2.0, known to 0.1): as they
-    came out of the fit 7 of 40 right files were doubted.
+    The zero of the alpha vane comes with the IMU's, and what comes out as a gyro's bias is off by
+    as much again as the file says (in calm air 2.1 mrad/s about q of 2.0, known to 0.1): as they
+    come out of the fit 7 of 40 right files are doubted.
     """
     found, covariance = found.copy(), NO_GPS_INFLATION**2 * covariance
     if FLOW[1] in names:
@@ -283,7 +283,7 @@ def _with_imu_errors(
     """Return the zero of the alpha vane and its deviation with errors of the IMU, rad.
 
     Without GPS they are no unknowns: the zero takes the tilt and the bias along x, which look like
-    it. 0.003 rad of either moved it by as much, known to 0.0009, and Cn_r by 0.5 %.
+    it. 0.003 rad of either moves it by as much, known to 0.0009, and Cn_r by 0.5 %.
 
     Parameters
     ----------
@@ -305,7 +305,7 @@ def _known_better(estimate: tuple[float, float], by_file: tuple[float, float]) -
     """Return whether a file knows an error better than a flight, and the flight does not object.
 
     Value and deviation of each. In light turbulence a flight of two minutes tells the vanes' delay
-    to 1.5 ms, a file to 0.6; 1.7 ms too much made Cm_q 3 % small.
+    to 1.5 ms, a file to 0.6; 1.7 ms too much makes Cm_q 3 % small.
     """
     (value, sd), (nominal, by) = estimate, by_file
     agrees = abs(value - nominal) < CONTRADICTION_SD * np.hypot(sd, by)

@@ -91,7 +91,7 @@ def estimate_with_constants(problem: OutputProblem, estimate: Array) -> Array | 
     """Return an estimate with the constants of each maneuver fitted, (P,).
 
     Outputs are linear in biases and start states: weighted least squares finds them, each output
-    weighed by what is left of it. Of equations of a user several steps do.
+    weighed by what is left of it. Equations of a user take several steps.
 
     Parameters
     ----------

@@ -131,7 +131,7 @@ def fly(
         in another air. Without, `seed` does.
     added_us : (n, 3) array, optional
         What the logger adds to aileron, elevator and rudder at each step: it flies the inputs, of
-        a card made by `flown_by_logger`. Of (0, 3): nothing yet.
+        a card made by `flown_by_logger`. Nothing yet: (0, 3).
     logger : callable, optional
         The logger in the same loop, of such a card that holds axes: see `LoopedLogger`. The
         pilot tilts the aircraft on the ground.

@@ -75,8 +75,8 @@ def logger_flight(
     card : Card
     seed : int
     recorder : callable
-        Runs the recorder with that flight card through the stimuli of a flight. Of a card that
-        holds axes the one on this computer flies along, and this one is not called.
+        Runs the recorder with that flight card through the stimuli of a flight. It is not called
+        with a card that holds axes: the recorder of this computer flies along.
     aircraft : Aircraft, optional
         In place of the card's.
 
