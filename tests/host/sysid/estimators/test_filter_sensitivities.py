@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
-from host.sysid.estimators.filter_error import fit_filter_error
+from host.errors import IdentificationError
+from host.sysid.estimators import filter_error
+from host.sysid.estimators.filter_error import fit_filter_error, near_its_optimum
 from host.sysid.estimators.gust_model import gust_model
 from host.sysid.models import LinearModel, Maneuver, Trim, template
 from host.sysid.numerics import FilterProblem, InnovationLikelihood, OutputProblem
@@ -118,3 +120,14 @@ def test_the_answer_does_not_hang_on_the_start(share: float) -> None:
     common = slice(0, len(model.parameters))
     step = (other.estimate - reference.estimate)[common] / reference.standard_error[common]
     assert np.max(np.abs(step)) < 0.1
+
+
+def test_a_search_that_must_end_makes_no_result_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(filter_error, "MAX_ITERATIONS", 1)
+    model = gusty_aircraft()
+    maneuvers, process = flown(model, (4,)), ("gust_rad", "airspeed_mps")
+    start = OutputProblem(model, maneuvers).first_guess()
+    early = fit_filter_error(model, maneuvers, process=process, start=start, compare_noise=False)
+    assert not near_its_optimum(early)
+    with pytest.raises(IdentificationError, match="no convergence: last step"):
+        fit_filter_error(model, maneuvers, process=process, start=start, must_end=True)
