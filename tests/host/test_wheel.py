@@ -1,7 +1,7 @@
 """The wheel of ./host, alone in an empty environment outside the clone, decodes a log.
 
 Only the wheel is installed there (`--no-deps`); the dependencies are lent by the interpreter of the
-tests through a path file, so that the test needs no 60 MB of downloads. Of the clone nothing is
+tests through a path file, so that the test needs no 60 MB of downloads. Nothing of the clone is
 reachable: the environment, the log and the working folder are elsewhere.
 """
 

@@ -115,8 +115,8 @@ def unstable(*, held: bool, seed: int) -> pd.DataFrame:
 
 @pytest.mark.parametrize("held", [False, True])
 def test_a_template_holds_the_truth_beside_its_bends(held: bool) -> None:
-    """A smooth input bends between samples: M_de was 0.22 % off, known to 0.11. Of a held one the
-    delay of the gyro sat on its bound, and Z_de was 2.5 % off, known to 1.5.
+    """A smooth input bends between samples: M_de was 0.22 % off, known to 0.11. With a held one
+    the delay of the gyro sat on its bound, and Z_de was 2.5 % off, known to 1.5.
 
     Without an accelerometer Z_de is what a vane late by 20 ms leaves of M_de, and no better known.
     Widths of single records hang on rounding: Z_alpha's are 2 to 11 % over six seeds.

@@ -93,8 +93,8 @@ def test_likelihood_and_innovations_of_filter_error_are_those_of_statsmodels(sha
     """Same model, same noise, first covariance the steady one: same likelihood to the last digit.
 
     Left to itself statsmodels starts from a diffuse state; the steady filter here takes start
-    states for parameters instead, which is the same from the second time constant on. Of outputs
-    that were measured at a share of the samples both leave out the others.
+    states for parameters instead, which is the same from the second time constant on. Both leave
+    out the samples at which an output was not measured.
     """
     maneuver = noisy(34, 0.05)
     seen = np.random.default_rng(38).random(maneuver.outputs.shape) < share
