@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from host.arrays import Array
 from host.cli import main
@@ -27,6 +26,7 @@ from host.sysid.checks import Finding
 from host.sysid.flight import read_columns
 from host.sysid.models import Maneuver
 
+from tests.host.short_period_table import short_period_table
 from tests.host.sysid.at_hand import identify
 from tests.host.sysid.verdicts import verdict_of
 
@@ -122,10 +122,10 @@ def _short(maneuver: Maneuver) -> Maneuver:
 
 
 def test_host_plot_bode_writes_a_page_and_pictures(
-    tmp_path: Path, columns: dict[str, Array], capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    pd.DataFrame(columns).to_csv(tmp_path / "flight.csv", index=False)
-    asked = ["plot", str(tmp_path / "flight.csv"), "--bode", "--model", "short-period"]
+    flight = str(short_period_table(tmp_path))
+    asked = ["plot", flight, "--bode", "--model", "short-period"]
     both = ["--png", str(tmp_path / "band.png"), "-o", str(tmp_path / "band.html")]
     assert main([*asked, *both]) == 0
     assert "elevator to q: coherence above 0.6 from" in capsys.readouterr().out
@@ -133,5 +133,5 @@ def test_host_plot_bode_writes_a_page_and_pictures(
     page = (tmp_path / "band.html").read_text()
     assert page.count("<img") == 1 and "chirp-z" in page and "<script" not in page
     assert main([*asked, "--png", str(tmp_path / "band.pdf")]) == 2
-    assert main(["plot", str(tmp_path / "flight.csv"), "--model", "short-period"]) == 2
+    assert main(["plot", flight, "--model", "short-period"]) == 2
     assert "only --bode fits a model" in capsys.readouterr().err
