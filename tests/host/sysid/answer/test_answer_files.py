@@ -19,12 +19,19 @@ from host.sysid.flight import read_columns
 from host.sysid.linear import Answer
 from scipy import io
 
+from tests.host.short_period_table import short_period_table
 from tests.host.sysid.at_hand import identify
 
 
 @pytest.fixture(scope="module")
 def flight(simulated: Callable[[str, int], Path]) -> Path:
     return simulated("calm", 4) / "flight.csv"
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A table of four columns, for what is asked of any flight."""
+    return short_period_table(tmp_path_factory.mktemp("small"))
 
 
 @pytest.fixture(scope="module")
@@ -117,14 +124,14 @@ def test_an_output_does_not_replace_what_it_is_made_from(
 
 
 def test_models_named_after_the_first_replace_no_source(
-    tmp_path: Path, flight: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, small: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source = tmp_path / "plane_short-period_recursive.toml"
     source.write_text("[coefficients]\nCm_alpha = -1.6\n")
     model = tmp_path / "plane.toml"
     prior = ("--aircraft", "ultrastick25e", "--prior", str(source))
     both = ("--method", "recursive", *prior, "--save-model", str(model))
-    assert main(["identify", str(flight), *QUICK, *both]) == 2
+    assert main(["identify", str(small), *QUICK, *both]) == 2
     assert f"would replace {source}" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == [source]
     assert source.read_text().startswith("[coefficients]")
@@ -142,7 +149,7 @@ def test_a_file_in_a_folder_that_takes_none_is_refused_before_the_work(
 
 def test_without_room_the_answer_is_said_and_nothing_is_left(
     tmp_path: Path,
-    flight: Path,
+    small: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -154,7 +161,7 @@ def test_without_room_the_answer_is_said_and_nothing_is_left(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Path, "write_text", full)
-    assert main(["identify", str(flight), *QUICK, "--save-model", str(target)]) == 2
+    assert main(["identify", str(small), *QUICK, "--save-model", str(target)]) == 2
     said = capsys.readouterr()
     assert said.err == (
         f"host: {target}: cannot be written: No space left on device; make room or name another"
@@ -165,12 +172,12 @@ def test_without_room_the_answer_is_said_and_nothing_is_left(
 
 
 def test_several_methods_of_one_model_are_several_files(
-    tmp_path: Path, flight: Path, line: Line
+    tmp_path: Path, small: Path, line: Line
 ) -> None:
     methods = ["--method", "equation-error", "--method", "output-error"]
     model, mat = tmp_path / "m.toml", tmp_path / "m.mat"
     places = ["--save-model", str(model), "--mat", str(mat)]
-    assert main(["identify", str(flight), "--model", "short-period", *methods, *places]) == 0
+    assert main(["identify", str(small), "--model", "short-period", *methods, *places]) == 0
     second = tmp_path / "m_short-period_output-error.toml"
     assert line() == f"wrote {mat}, {model}, {second}"
     assert 'method = "equation' in model.read_text()

@@ -63,15 +63,15 @@ def both(flights: tuple[Path, Path]) -> Identification:
 def test_it_says_what_the_verb_says(
     one: Identification,
     flights: tuple[Path, Path],
+    small: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    source = flights[0] / "flight.csv"
-    quick = host.identify(source, aircraft=NAME, models="short-period", methods="equation-error")
-    options = ["identify", str(source), "--aircraft", NAME]
+    quick = host.identify(small, aircraft=NAME, models="short-period", methods="equation-error")
     found = ["--model", "short-period", "--method", "equation-error", "--json"]
-    assert main([*options, *found]) == 0
+    assert main(["identify", str(small), "--aircraft", NAME, *found]) == 0
     assert capsys.readouterr().out.rstrip("\n") == quick.to_json()
+    options = ["identify", str(flights[0] / "flight.csv"), "--aircraft", NAME]
     # What it prints of all models is asked, not a second time what it finds.
     monkeypatch.setattr("host.sysid.pipeline.stages.identify", lambda *_, **__: one)
     for more, said in (("--full", one.to_text()), ("--json", one.to_json()), (None, str(one))):
@@ -132,7 +132,7 @@ def test_the_verdict_is_lines_and_the_answer_reads_itself(one: Identification) -
 
 
 def test_a_table_at_hand_gives_the_same_numbers(
-    one: Identification, flights: tuple[Path, Path]
+    one: Identification, flights: tuple[Path, Path], small: Path
 ) -> None:
     table = pd.read_csv(flights[0] / "flight.csv")
     found = host.identify(table, aircraft=NAME, models="longitudinal")
@@ -141,7 +141,7 @@ def test_a_table_at_hand_gives_the_same_numbers(
     np.testing.assert_allclose(ours["value"], theirs["value"], rtol=1e-9)
     np.testing.assert_allclose(ours["half_width"], theirs["half_width"], rtol=1e-9)
     with_index = host.identify(
-        table.set_index("t_s"), models="short-period", methods="equation-error"
+        pd.read_csv(small).set_index("t_s"), models="short-period", methods="equation-error"
     )
     assert "M_alpha" in loose(with_index.table).loc["short-period"].index
 
@@ -221,13 +221,13 @@ def test_messages_name_arguments_and_the_verb_their_options(
 
 
 def test_the_verb_takes_several_flights(
-    both: Identification, flights: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+    both: Identification, small: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    sources = [str(folder / "flight.csv") for folder in flights]
-    assert (
-        main(["identify", *sources, "--model", "lateral", "--method", "equation-error", "--json"])
-        == 0
-    )
+    other = tmp_path / "other.csv"
+    pd.read_csv(small).iloc[50:].to_csv(other, index=False)
+    sources = [str(small), str(other)]
+    quick = ["--model", "short-period", "--method", "equation-error", "--json"]
+    assert main(["identify", *sources, *quick]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["source"] == sources
     assert {m[-len("of flight 2") :] for m in answer["answers"][0]["maneuvers"]} == {
