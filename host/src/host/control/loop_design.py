@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -77,17 +78,24 @@ def search(problem: Problem, seen: Scenarios, asked: Required) -> dict[str, floa
     roles = tuple(problem.structure.searched)
     highest = [_reach(problem, seen, role) for role in roles]
 
-    def gains_of(shares: Array) -> dict[str, float]:
+    def steps_of(shares: Array) -> tuple[int, ...]:
         # By the logarithm: half of all tries lie below the root of the largest.
         steps = (np.array(highest) + 1.0) ** shares - 1.0
+        return tuple(round(float(n)) for n in steps)
+
+    def gains_of(steps: tuple[int, ...]) -> dict[str, float]:
         chosen = {
-            role: _least(problem, role) + round(float(n)) * settings[role].step
+            role: _least(problem, role) + n * settings[role].step
             for role, n in zip(roles, steps, strict=True)
         }
         return problem.structure.completed(chosen, feed_forward(problem))
 
+    @cache  # of all tries nearly half fall on steps that were tried
+    def worth(steps: tuple[int, ...]) -> float:
+        return _worth(seen, gains_of(steps), asked)
+
     def cost(shares: Array) -> float:
-        return -_worth(seen, gains_of(shares), asked)
+        return -worth(steps_of(shares))
 
     found = differential_evolution(
         cost,
@@ -97,8 +105,8 @@ def search(problem: Problem, seen: Scenarios, asked: Required) -> dict[str, floa
         maxiter=25,
         polish=False,
     )
-    best = gains_of(found.x)
-    return best if _worth(seen, best, asked) > 0.0 else None
+    best = steps_of(found.x)
+    return gains_of(best) if worth(best) > 0.0 else None
 
 
 def softest(problem: Problem) -> dict[str, float]:

@@ -82,7 +82,9 @@ class Scenarios:
 
     def loops(self, gains: Mapping[str, float]) -> tuple[Spectra, Spectra]:
         """Return the loop broken at the actuator and the attitude loop, each (speeds * N, F)."""
-        by_angle, by_rate = self._laws(gains)
+        return self._broken(*self._laws(gains))
+
+    def _broken(self, by_angle: Spectra, by_rate: Spectra) -> tuple[Spectra, Spectra]:
         # Measured values enter with a minus: L is what comes back, turned.
         angle = -by_angle[:, None] * self.responses[..., 0]
         rate = -by_rate[:, None] * self.responses[..., 1]
@@ -187,8 +189,8 @@ class Scenarios:
     def _output_power(self, gains: Mapping[str, float]) -> Array:
         """Return the output's spectrum in gusts and by noise, shares^2 s, (speeds, N, F)."""
         period = self.problem.period_s
-        inner, _ = self.loops(gains)
         by_angle, by_rate = self._laws(gains)
+        inner, _ = self._broken(by_angle, by_rate)
         closes = 1.0 / (1.0 + inner.reshape(self._surfaces.shape))
         white = self.problem.gyro_noise_radps**2 * period / np.pi
         power = np.abs(by_rate[:, None]) ** 2 * white
