@@ -200,7 +200,7 @@ def test_an_identified_model_is_a_prior_within_its_intervals(
 ) -> None:
     model = tmp_path / "model.toml"
     model.write_text(MODEL)
-    fleet = identified_range(aircraft, [model], 400)
+    fleet = identified_range(aircraft, [model], 120)
     # Body axes: w = V alpha (all but the cosine of alpha), so M_alpha stands divided by V.
     pitch = np.array([a.straight.longitudinal_a[2] for a in fleet if a.straight is not None])
     share = float(np.std(pitch[:, 1] / pitch[0, 1]))
