@@ -128,12 +128,6 @@ SWITCHES = (
         argument(0),
     ),
     _one(
-        "slow start",
-        "moves the start of an input back to where it leaves its rest",
-        "maneuvers.maneuver_detection:_slow_start",
-        argument(2),
-    ),
-    _one(
         "weak maneuvers",
         "leaves maneuvers of a weak grade out",
         "flight.fitted_maneuvers:_worth_it",
