@@ -265,7 +265,7 @@ TEST_CASE("a start in a steep turn is not valid before gravity was seen for thre
     filter.in.rates[1] = 1735;
     filter.in.rates[2] = 1735;
     filter.in.force[2] = -11585;
-    for (uint8_t second = 0; second < 20; ++second) {
+    for (uint8_t second = 0; second < 6; ++second) {
       if (known != 0) {
         filter.attitude.set_speed(1500);
       }
