@@ -4,6 +4,7 @@
     make ideas IDEAS=--still   what the syntax trees say alone, in seconds
     make ideas IDEAS=--check   the table of numbers alone: 6 if one has no class
     make ideas IDEAS=--follow  the table rewritten for the code as it is
+    make ideas IDEAS=--effects what each tuned number does to frozen answers: hours, goes on
     make ideas LITERALS=30     numbers drawn and changed by 20 %: 6 if a frozen answer moves
 
 Exits with 6 where the declaration names what is not there, too.
@@ -32,6 +33,8 @@ from tests.ideas.declared import Kind, kinds
 from tests.ideas.drawn import ALL_CASES, CASES, drawn, movers
 from tests.ideas.entered import Entered, entered, simulated, total_calls
 from tests.ideas.literals import Key, code_literals, toml_files, toml_literals
+from tests.ideas.sensitivity import measure
+from tests.ideas.sensitivity import read as read_effects
 from tests.ideas.sources import (
     ROOT,
     Function,
@@ -59,6 +62,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--names", action="store_true", help="name every long or branched function")
     parser.add_argument("--check", action="store_true", help="only: has every number a class?")
     parser.add_argument("--follow", action="store_true", help="rewrite the table of numbers")
+    parser.add_argument("--effects", action="store_true", help="change every tuned number alone")
     parser.add_argument("--change", type=int, metavar="N", help="draw N numbers and change them")
     parser.add_argument("--all", action="store_true", help="by every frozen answer, not three")
     parser.add_argument("--seed", type=int, default=1, help="of the draw (default 1)")
@@ -72,6 +76,10 @@ def main(arguments: list[str] | None = None) -> int:
         write(follow(keys, rows))
         rows = read()
     if asked.check or asked.follow:
+        return _print_numbers(keys, rows)
+    if asked.effects:
+        tuned = [key for key in keys if (row := row_of(key, rows)) and row.kind == "tuned"]
+        measure(tuned, known)
         return _print_numbers(keys, rows)
     if asked.change:
         cases = ALL_CASES if asked.all else CASES
@@ -97,8 +105,15 @@ def _print_numbers(keys: list[Key], rows: dict[Key, Row]) -> int:
     of_class = counted(keys, rows)
     listed = ", ".join(f"{kind} {of_class[kind]}" for kind in (*CLASSES, OPEN) if of_class[kind])
     _row("numbers that host.identify can reach", len(keys), listed)
-    tuned = [row for row in (row_of(key, rows) for key in keys) if row and row.kind == "tuned"]
-    _row("tuned numbers with a source", sum(bool(row.source) for row in tuned), f"of {len(tuned)}")
+    tuned = {k: row for k in keys if (row := row_of(k, rows)) and row.kind == "tuned"}
+    effects = read_effects()
+    moving = [key for key in tuned if key not in effects or effects[key].moved]
+    sourced = sum(bool(tuned[key].source) for key in moving)
+    _row(
+        "tuned numbers that move a frozen answer",
+        len(moving),
+        f"of {len(tuned)}; {sourced} with a page or a data sheet",
+    )
     bare, gone = missing(keys, rows), stale(keys, rows)
     for key in bare:
         print(f"no class: {key.file} {key.name} {key.value}", file=sys.stderr)

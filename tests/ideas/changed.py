@@ -1,7 +1,8 @@
 """Frozen answers with numbers of the code changed: run in a process of its own.
 
 Standard input holds JSON: ``keys`` (file, name, value) and ``cases``. Each number is changed by
-20 % as its module is imported, wherever it stands under that name; no file is written. Prints JSON:
+20 % as its module is imported or its TOML is read, wherever it stands under that name; no file is
+written. Prints JSON:
 the first lines of each case that moved, and the files that were imported.
 """
 
@@ -17,10 +18,13 @@ import importlib.machinery
 import json
 import math
 import sys
+import tomllib
 from collections.abc import Sequence
 from types import CodeType, ModuleType
+from typing import Any
 
 from tests.ideas.literals import Key, number, numbers
+from tests.ideas.sources import ROOT
 
 CHANGE = 1.2
 TOLERANCE = 1e-2  # of a half-width, as between two machines: a search ends that near to its minimum
@@ -85,11 +89,41 @@ class Finder(importlib.abc.MetaPathFinder):
         return spec
 
 
+def change_numbers(keys: Sequence[Key]) -> Finder:
+    """Change numbers of all modules that are imported from now on, and of TOML read from now on."""
+    finder = Finder([key for key in keys if not key.file.endswith(".toml")])
+    sys.meta_path.insert(0, finder)
+    for key in keys:
+        if key.file.endswith(".toml"):
+            _change_toml(key)
+    return finder
+
+
+def _change_toml(key: Key) -> None:
+    path = next((ROOT / "host" / "src" / "host").rglob(key.file))
+    text, loads = path.read_text(encoding="utf-8"), tomllib.loads
+
+    def changed_loads(given: str, **named: Any) -> dict[str, Any]:
+        document: dict[str, Any] = loads(given, **named)
+        found: dict[str, Any] = _changed_leaves(document, "", key) if given == text else document
+        return found
+
+    tomllib.loads = changed_loads
+
+
+def _changed_leaves(value: Any, place: str, key: Key) -> Any:
+    if isinstance(value, dict):
+        inner = {name: f"{place}.{name}".lstrip(".") for name in value}
+        return {name: _changed_leaves(one, inner[name], key) for name, one in value.items()}
+    if isinstance(value, list):
+        return [_changed_leaves(one, place, key) for one in value]
+    return changed(value) if place == key.name and repr(value) == key.value else value
+
+
 def main() -> None:
     """Run the cases and print what moved."""
     asked = json.load(sys.stdin)
-    finder = Finder([Key(*key) for key in asked["keys"]])
-    sys.meta_path.insert(0, finder)
+    finder = change_numbers([Key(*key) for key in asked["keys"]])
     from tests.answers.cases import CASES
     from tests.answers.comparison import moved
     from tests.answers.frozen_answer import frozen

@@ -117,18 +117,19 @@ def test_change_is_a_fifth_and_a_whole_number_stays_whole() -> None:
     assert changed(0.5) == pytest.approx(0.6)
 
 
-@pytest.mark.parametrize(("file", "name", "value", "kept"), [
-    ("constants", "GRAVITY_MPS2", "9.80665", False),  # moves every coefficient
-    ("progress", "_WIDTH", "32", True),  # of a bar
+@pytest.mark.parametrize(("file", "name", "value", "case", "kept"), [
+    ("constants", "GRAVITY_MPS2", "9.80665", "trainer-pitch-aircraft", False),  # moves all
+    ("progress", "_WIDTH", "32", "trainer-pitch-aircraft", True),  # width of a bar
+    ("foreign.toml", "error.pot_scale.sigma", "0.03", "twin-multisine", False),  # read as text
 ])  # fmt: skip
 def test_changed_number_moves_an_answer_only_if_it_acts(
-    file: str, name: str, value: str, kept: bool
+    file: str, name: str, value: str, case: str, kept: bool
 ) -> None:
-    asked = {"keys": [[file, name, value]], "cases": ["trainer-pitch-aircraft"]}
+    asked = {"keys": [[file, name, value]], "cases": [case]}
     command = [sys.executable, "-m", "tests.ideas.changed"]
     done = subprocess.run(
         command, cwd=ROOT, input=json.dumps(asked), stdout=subprocess.PIPE, text=True, check=True
     )
     answer = json.loads(done.stdout.splitlines()[-1])
-    assert answer["imported"] == [file]
+    assert answer["imported"] == ([] if file.endswith(".toml") else [file])
     assert (not answer["moved"]) is kept
