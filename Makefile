@@ -84,7 +84,7 @@ hw: ## check schematic, board and mechanics in KiCad and CAD (asks for an apt so
 	@.venv-hw/bin/python -m pytest --noconftest tests/hw/campaign/check_*.py
 
 ideas: setup sitl ## count what a reader must know: files, functions, filters, verdicts and numbers of identification
-	@$(PYTHON) -m tests.ideas $(IDEAS) $(if $(LITERALS),--change $(LITERALS))
+	@PYTHONPATH=host $(PYTHON) -m tests.ideas $(IDEAS) $(if $(LITERALS),--change $(LITERALS))
 
 mutants: setup ## share of mutants of core and drivers that their unit tests kill, 95 % wanted (hours; goes on)
 	@$(PYTHON) -m tests.mutants $(MUTANTS)

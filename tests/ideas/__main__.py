@@ -30,11 +30,10 @@ from tests.ideas.classes import (
     write,
 )
 from tests.ideas.declared import Kind, kinds
-from tests.ideas.drawn import ALL_CASES, CASES, drawn, movers
+from tests.ideas.drawn import ALL_CASES, CASES, TOGETHER, drawn
+from tests.ideas.effects import read as read_effects
 from tests.ideas.entered import Entered, entered, simulated, total_calls
 from tests.ideas.literals import Key, code_literals, toml_files, toml_literals
-from tests.ideas.sensitivity import measure
-from tests.ideas.sensitivity import read as read_effects
 from tests.ideas.sources import (
     ROOT,
     Function,
@@ -79,6 +78,8 @@ def main(arguments: list[str] | None = None) -> int:
         return _print_numbers(keys, rows)
     if asked.effects:
         tuned = [key for key in keys if (row := row_of(key, rows)) and row.kind == "tuned"]
+        from tests.ideas.sensitivity import measure  # studies are on the path of `make ideas`
+
         measure(tuned, known)
         return _print_numbers(keys, rows)
     if asked.change:
@@ -108,12 +109,10 @@ def _print_numbers(keys: list[Key], rows: dict[Key, Row]) -> int:
     tuned = {k: row for k in keys if (row := row_of(k, rows)) and row.kind == "tuned"}
     effects = read_effects()
     moving = [key for key in tuned if key not in effects or effects[key].moved]
+    sourced = sum(bool(row.source) for row in tuned.values())
+    _row("tuned numbers with a source", sourced, f"of {len(tuned)}")
     sourced = sum(bool(tuned[key].source) for key in moving)
-    _row(
-        "tuned numbers that move a frozen answer",
-        len(moving),
-        f"of {len(tuned)}; {sourced} with a page or a data sheet",
-    )
+    _row("tuned numbers that move a frozen answer", len(moving), f"{sourced} of them with a source")
     bare, gone = missing(keys, rows), stale(keys, rows)
     for key in bare:
         print(f"no class: {key.file} {key.name} {key.value}", file=sys.stderr)
@@ -125,11 +124,19 @@ def _print_numbers(keys: list[Key], rows: dict[Key, Row]) -> int:
 
 def _change(keys: list[Key], cases: Sequence[str]) -> int:
     """Change numbers, and name those that move a frozen answer."""
-    found = list(movers(keys, cases))
+    from tests.ideas.changed import movers  # studies are on the path of `make ideas`
+
+    groups = [keys[start : start + TOGETHER] for start in range(0, len(keys), TOGETHER)]
+    found = [one for group in groups for one in movers(group, cases)]
     _row("numbers changed by 20 %", len(keys), f"{len(found)} move a frozen answer")
-    for one in found:
-        print(f"{one.key.file} {one.key.name} {one.key.value}")
-        print("".join(f"    {line}\n" for line in one.lines), end="")
+    for key, moved in found:
+        print(f"{key.file} {key.name} {key.value}")
+        print(
+            "".join(
+                f"    {name}: {line}\n" for name, one in moved.items() for line in one["lines"][:3]
+            ),
+            end="",
+        )
     return 6 if found else 0
 
 

@@ -1,10 +1,4 @@
-"""Frozen answers with numbers of the code changed: run in a process of its own.
-
-Standard input holds JSON: ``keys`` (file, name, value) and ``cases``. Each number is changed by
-20 % as its module is imported or its TOML is read, wherever it stands under that name; no file is
-written. Prints JSON:
-the first lines of each case that moved, and the files that were imported.
-"""
+"""Frozen answers with numbers of the code changed by 20 %; no file is written."""
 
 from __future__ import annotations
 
@@ -15,20 +9,22 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import ast
 import importlib.abc
 import importlib.machinery
-import json
 import math
+import signal
 import sys
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from types import CodeType, ModuleType
 from typing import Any
 
+from studies.switch_off.apart import apart
+
+from tests.ideas.effects import TOLERANCE, Again
 from tests.ideas.literals import Key, number, numbers
 from tests.ideas.sources import ROOT
 
 CHANGE = 1.2
-TOLERANCE = 1e-2  # of a half-width, as between two machines: a search ends that near to its minimum
-MOST_LINES = 3
+LONGEST_S = 900
 
 
 def changed(value: complex | float) -> complex | float:
@@ -120,28 +116,56 @@ def _changed_leaves(value: Any, place: str, key: Key) -> Any:
     return changed(value) if place == key.name and repr(value) == key.value else value
 
 
-def main() -> None:
-    """Run the cases and print what moved."""
-    asked = json.load(sys.stdin)
-    finder = change_numbers([Key(*key) for key in asked["keys"]])
+def answers(names: Collection[str]) -> dict[str, Again]:
+    """Answer cases again, and return what each came to."""
     from tests.answers.cases import CASES
     from tests.answers.comparison import moved
     from tests.answers.frozen_answer import frozen
 
-    found: dict[str, list[str]] = {}
+    found: dict[str, Again] = {}
     for case in CASES:
-        if case.name not in asked["cases"]:
+        if case.name not in names:
             continue
         old = frozen(case.name)
         assert old is not None, case.name
         try:
-            lines = moved(old, case.answer(), TOLERANCE)
+            new = case.answer()
+            lines = moved(old, new, TOLERANCE)
         except Exception as error:
-            lines = [f"{type(error).__name__}: {error}"]
-        if lines:
-            found[case.name] = lines[:MOST_LINES]
-    print(json.dumps({"moved": found, "imported": sorted(finder.imported)}))
+            new, lines = {}, [f"{type(error).__name__}: {error}"]
+        found[case.name] = {"old": old, "new": new, "lines": lines}
+    return found
 
 
-if __name__ == "__main__":
-    main()
+def changed_answers(keys: Sequence[Key], names: Collection[str]) -> dict[str, Again]:
+    """Return what cases come to with numbers changed, in a process of its own.
+
+    All have no answer where that process dies or hangs. Modules of the package that this one has
+    imported already stay as they are.
+    """
+
+    def work() -> dict[str, Again]:
+        signal.alarm(LONGEST_S)
+        change_numbers(keys)
+        return answers(names)
+
+    stopped: Again = {"old": {}, "new": {}, "lines": [f"stopped, or no end in {LONGEST_S} s"]}
+    found: dict[str, Again] | None = apart(work)
+    return dict.fromkeys(names, stopped) if found is None else found
+
+
+def movers(keys: Sequence[Key], names: Collection[str]) -> Iterator[tuple[Key, dict[str, Again]]]:
+    """Change numbers together; yield those that move a case by themselves, and the cases moved.
+
+    Where an answer moves, the half of the numbers that moves it is sought, by that answer alone.
+    """
+    found = changed_answers(keys, names) if keys and names else {}
+    found = {name: one for name, one in found.items() if one["lines"]}
+    said = ", ".join(found) or "nothing"
+    print(f"{said} moved by {', '.join(f'{k.file}:{k.name} {k.value}' for k in keys)}", flush=True)
+    if found and len(keys) == 1:
+        yield keys[0], found
+    elif found:
+        half = len(keys) // 2
+        yield from movers(keys[:half], found)
+        yield from movers(keys[half:], found)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.ideas.effects import Effect, effect, read, write
 from tests.ideas.literals import Key
 from tests.ideas.number_users import users
-from tests.ideas.sensitivity import Effect, _largest, _scored, read, write
 from tests.ideas.sources import modules
 
 OWN = """from b import SHARED
@@ -59,17 +59,29 @@ def record(value: float, half: float, off: float) -> dict[str, object]:
     return {"answers": [answer], "off": {"t, m, M_q": off}}
 
 
+KEY = Key("a", "f", "3")
+
+
+def again(value: float, half: float, off: float) -> Effect:
+    """Return the row of a number that makes this of 1 +- 0.5, off by half of that."""
+    old, new = record(1.0, 0.5, 0.5), record(value, half, off)
+    return effect(KEY, 7, {"stuck": {"old": old, "new": new, "lines": ["words"]}})
+
+
 def test_a_score_counts_widths_and_misses() -> None:
-    wider = _scored(record(1.0, 0.5, 0.5), record(1.0, 0.6, 0.4))
-    assert wider["now"] / wider["before"] == pytest.approx(1.2)
-    missed = _scored(record(1.0, 0.5, 0.5), record(1.5, 0.5, 1.1))
-    assert missed["now"] / missed["before"] == pytest.approx((2.0 + 40.0 * 0.1) / 2.0)
-    assert (missed["held_before"], missed["held"]) == (1, 0)
+    assert again(1.0, 0.6, 0.4).score == pytest.approx(1.2)
+    missed = again(1.5, 0.5, 1.1)
+    assert missed.score == pytest.approx((2.0 + 40.0 * 0.1) / 2.0)
+    assert (missed.held_before, missed.held) == (1, 0)
 
 
 def test_the_largest_movement_is_in_half_widths() -> None:
-    found = _largest(record(1.0, 0.5, 0.5), record(1.1, 0.75, 0.5), ["words"])
-    assert found["most"] == pytest.approx(0.5)
-    assert found["line"].startswith("t, m, M_q 1 +- 0.5 -> 1.1")
-    words = _largest(record(1.0, 0.5, 0.5), record(1.0, 0.5, 0.5), ["words"])
-    assert words == {"most": 0.0, "line": "words"}
+    found = again(1.1, 0.75, 0.5)
+    assert (found.cases, found.moved, found.most) == (7, 1, 0.5)
+    assert found.where.startswith("stuck: t, m, M_q 1 +- 0.5 -> 1.1")
+    words = again(1.0, 0.5, 0.5)
+    assert (words.moved, words.most, words.where) == (1, 0.0, "stuck: words")
+
+
+def test_what_moves_nothing_has_an_empty_row() -> None:
+    assert effect(KEY, 3, {}) == Effect("a", "f", "3", 3, 0, 0.0, "", 0, 0, 1.0)

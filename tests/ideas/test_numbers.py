@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import ast
-import json
-import subprocess
-import sys
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
 
-from tests.ideas.changed import changed
+from tests.ideas.changed import answers, change_numbers, changed
 from tests.ideas.classes import Row, follow, missing, read, stale, write
 from tests.ideas.drawn import drawn
 from tests.ideas.literals import Key, code_literals, numbers, toml_literals
-from tests.ideas.sources import ROOT, modules
+from tests.ideas.sources import modules
 
 
 def found(text: str) -> list[tuple[str, str]]:
@@ -125,11 +124,13 @@ def test_change_is_a_fifth_and_a_whole_number_stays_whole() -> None:
 def test_changed_number_moves_an_answer_only_if_it_acts(
     file: str, name: str, value: str, case: str, kept: bool
 ) -> None:
-    asked = {"keys": [[file, name, value]], "cases": [case]}
-    command = [sys.executable, "-m", "tests.ideas.changed"]
-    done = subprocess.run(
-        command, cwd=ROOT, input=json.dumps(asked), stdout=subprocess.PIPE, text=True, check=True
-    )
-    answer = json.loads(done.stdout.splitlines()[-1])
-    assert answer["imported"] == ([] if file.endswith(".toml") else [file])
-    assert (not answer["moved"]) is kept
+    with ProcessPoolExecutor(1, get_context("spawn")) as fresh:  # this one has imported the package
+        moved, imported = fresh.submit(changed_case, Key(file, name, value), case).result()
+    assert imported == ([] if file.endswith(".toml") else [file])
+    assert (not moved) is kept
+
+
+def changed_case(key: Key, case: str) -> tuple[list[str], list[str]]:
+    """Return what moves in a case with a number changed, and the files changed."""
+    finder = change_numbers([key])
+    return answers([case])[case]["lines"], sorted(finder.imported)
