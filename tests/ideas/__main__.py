@@ -5,6 +5,7 @@
     make ideas IDEAS=--check   the table of numbers alone: 6 if one has no class
     make ideas IDEAS=--follow  the table rewritten for the code as it is
     make ideas IDEAS=--effects what each tuned number does to frozen answers: hours, goes on
+    make ideas IDEAS=--neighbours  what half and twice of those that name no source do
     make ideas LITERALS=30     numbers drawn and changed by 20 %: 6 if a frozen answer moves
 
 Exits with 6 where the declaration names what is not there, too.
@@ -62,6 +63,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--check", action="store_true", help="only: has every number a class?")
     parser.add_argument("--follow", action="store_true", help="rewrite the table of numbers")
     parser.add_argument("--effects", action="store_true", help="change every tuned number alone")
+    parser.add_argument("--neighbours", action="store_true", help="halve and double, too")
     parser.add_argument("--change", type=int, metavar="N", help="draw N numbers and change them")
     parser.add_argument("--all", action="store_true", help="by every frozen answer, not three")
     parser.add_argument("--seed", type=int, default=1, help="of the draw (default 1)")
@@ -81,6 +83,12 @@ def main(arguments: list[str] | None = None) -> int:
         from tests.ideas.sensitivity import measure  # studies are on the path of `make ideas`
 
         measure(tuned, known)
+        return _print_numbers(keys, rows)
+    if asked.neighbours:
+        bare = [k for k in keys if (r := row_of(k, rows)) and r.kind == "tuned" and not r.source]
+        from tests.ideas.sensitivity import measure_neighbours
+
+        measure_neighbours(bare, known)
         return _print_numbers(keys, rows)
     if asked.change:
         cases = ALL_CASES if asked.all else CASES

@@ -1,4 +1,4 @@
-"""Frozen answers with numbers of the code changed by 20 %; no file is written."""
+"""Frozen answers with numbers of the code changed, by 20 % or a factor; no file is written."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ import signal
 import sys
 import tomllib
 from collections.abc import Collection, Iterator, Sequence
+from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
@@ -24,25 +25,32 @@ from tests.ideas.literals import Key, number, numbers
 from tests.ideas.sources import ROOT
 
 CHANGE = 1.2
+NEARLY_ALL = 0.9
 LONGEST_S = 900
 
 
-def changed(value: complex | float) -> complex | float:
-    """Return a number 20 % larger; a whole one is moved by one at least."""
+def changed(value: complex | float, by: float = CHANGE) -> complex | float:
+    """Return a number times a factor; a whole one is moved by one at least.
+
+    A share of nearly all, a quantile or a correlation, cannot exceed one: what it lacks is changed.
+    """
+    if isinstance(value, float) and NEARLY_ALL <= value < 1.0:
+        return 1.0 - (1.0 - value) * by
     if not isinstance(value, int):
-        return value * CHANGE
-    return int(math.copysign(max(round(abs(value) * CHANGE), abs(value) + 1), value))
+        return value * by
+    limit, least = (max, abs(value) + 1) if by > 1.0 else (min, abs(value) - 1)
+    return int(math.copysign(limit(round(abs(value) * by), least), value))
 
 
 class _Change(ast.NodeTransformer):
-    def __init__(self, nodes: Sequence[ast.expr]) -> None:
-        self.nodes = nodes
+    def __init__(self, nodes: Sequence[ast.expr], by: float) -> None:
+        self.nodes, self.by = nodes, by
 
     def visit(self, node: ast.AST) -> ast.AST:
         if any(node is one for one in self.nodes):
             value = number(node)
             assert value is not None
-            return ast.copy_location(ast.Constant(changed(value)), node)
+            return ast.copy_location(ast.Constant(changed(value, self.by)), node)
         return self.generic_visit(node)
 
 
@@ -50,6 +58,7 @@ class Loader(importlib.machinery.SourceFileLoader):
     """Compile a module with numbers changed."""
 
     keys: Sequence[Key]
+    by: float
 
     def get_code(self, fullname: str) -> CodeType:
         """Return the code of the module, and never what was kept of it."""
@@ -57,7 +66,7 @@ class Loader(importlib.machinery.SourceFileLoader):
         found = [node for key, node in numbers(tree, self.keys[0].file) if key in self.keys]
         if not found:
             raise SystemExit(f"none of {self.keys} in {self.path}")
-        _Change(found).visit(tree)
+        _Change(found, self.by).visit(tree)
         code: CodeType = compile(ast.fix_missing_locations(tree), self.path, "exec")
         return code
 
@@ -65,8 +74,8 @@ class Loader(importlib.machinery.SourceFileLoader):
 class Finder(importlib.abc.MetaPathFinder):
     """Find the files whose numbers are changed before all others do."""
 
-    def __init__(self, keys: Sequence[Key]) -> None:
-        self.keys = keys
+    def __init__(self, keys: Sequence[Key], by: float) -> None:
+        self.keys, self.by = keys, by
         self.imported: set[str] = set()
 
     def find_spec(
@@ -77,43 +86,45 @@ class Finder(importlib.abc.MetaPathFinder):
         if not name.startswith("host.") or not own:
             return None
         spec = importlib.machinery.PathFinder.find_spec(name, path, target)
-        if spec is not None and spec.origin is not None:
+        if spec is not None and spec.origin is not None and Path(spec.origin).stem == own[0].file:
             loader = Loader(name, spec.origin)
-            loader.keys = own
+            loader.keys, loader.by = own, self.by
             spec.loader = loader
             self.imported.add(own[0].file)
         return spec
 
 
-def change_numbers(keys: Sequence[Key]) -> Finder:
+def change_numbers(keys: Sequence[Key], by: float = CHANGE) -> Finder:
     """Change numbers of all modules that are imported from now on, and of TOML read from now on."""
-    finder = Finder([key for key in keys if not key.file.endswith(".toml")])
+    finder = Finder([key for key in keys if not key.file.endswith(".toml")], by)
     sys.meta_path.insert(0, finder)
     for key in keys:
         if key.file.endswith(".toml"):
-            _change_toml(key)
+            _change_toml(key, by)
     return finder
 
 
-def _change_toml(key: Key) -> None:
+def _change_toml(key: Key, by: float) -> None:
     path = next((ROOT / "host" / "src" / "host").rglob(key.file))
     text, loads = path.read_text(encoding="utf-8"), tomllib.loads
 
     def changed_loads(given: str, **named: Any) -> dict[str, Any]:
         document: dict[str, Any] = loads(given, **named)
-        found: dict[str, Any] = _changed_leaves(document, "", key) if given == text else document
+        found: dict[str, Any] = (
+            _changed_leaves(document, "", key, by) if given == text else document
+        )
         return found
 
     tomllib.loads = changed_loads
 
 
-def _changed_leaves(value: Any, place: str, key: Key) -> Any:
+def _changed_leaves(value: Any, place: str, key: Key, by: float) -> Any:
     if isinstance(value, dict):
         inner = {name: f"{place}.{name}".lstrip(".") for name in value}
-        return {name: _changed_leaves(one, inner[name], key) for name, one in value.items()}
+        return {name: _changed_leaves(one, inner[name], key, by) for name, one in value.items()}
     if isinstance(value, list):
-        return [_changed_leaves(one, place, key) for one in value]
-    return changed(value) if place == key.name and repr(value) == key.value else value
+        return [_changed_leaves(one, place, key, by) for one in value]
+    return changed(value, by) if place == key.name and repr(value) == key.value else value
 
 
 def answers(names: Collection[str]) -> dict[str, Again]:
@@ -137,7 +148,9 @@ def answers(names: Collection[str]) -> dict[str, Again]:
     return found
 
 
-def changed_answers(keys: Sequence[Key], names: Collection[str]) -> dict[str, Again]:
+def changed_answers(
+    keys: Sequence[Key], names: Collection[str], by: float = CHANGE
+) -> dict[str, Again]:
     """Return what cases come to with numbers changed, in a process of its own.
 
     All have no answer where that process dies or hangs. Modules of the package that this one has
@@ -146,7 +159,7 @@ def changed_answers(keys: Sequence[Key], names: Collection[str]) -> dict[str, Ag
 
     def work() -> dict[str, Again]:
         signal.alarm(LONGEST_S)
-        change_numbers(keys)
+        change_numbers(keys, by)
         return answers(names)
 
     stopped: Again = {"old": {}, "new": {}, "lines": [f"stopped, or no end in {LONGEST_S} s"]}

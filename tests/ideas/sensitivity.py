@@ -1,7 +1,8 @@
 """Change every tuned number alone, and answer frozen cases again: ``make ideas IDEAS=--effects``.
 
 `FIRST` are answered for each number by itself; all others for many numbers at once where nothing
-moved. Only cases that enter code with a number are answered.
+moved. Only cases that enter code with a number are answered. ``--neighbours`` halves and doubles
+those that moved an answer and name no source.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import Any
 
 from studies.switch_off.apart import apart
 
+from tests.ideas import neighbours
 from tests.ideas.changed import changed_answers, movers
 from tests.ideas.drawn import ALL_CASES
 from tests.ideas.effects import TABLE, effect, read, write
@@ -38,12 +40,7 @@ def measure(keys: Sequence[Key], known: Mapping[str, Module], table: Path = TABL
     for name in PRELOADED:
         importlib.import_module(name)
     rows = {key: row for key, row in read(table).items() if key in set(keys)}
-    entered = {name: set(apart(lambda name=name: _entering(name))) for name in ALL_CASES}  # type: ignore[misc]
-    acting = users(known.values())
-    cases = {
-        key: [name for name in entered if key not in acting or acting[key] & entered[name]]
-        for key in keys
-    }
+    cases = _cases(keys, known)
     for key in keys:
         if key not in rows:
             names = [name for name in cases[key] if name in FIRST]
@@ -57,6 +54,31 @@ def measure(keys: Sequence[Key], known: Mapping[str, Module], table: Path = TABL
         rows |= {key: effect(key, len(cases[key]), {}) for key in group}
         rows |= {key: effect(key, len(cases[key]), found) for key, found in movers(group, others)}
         write(rows.values(), table)
+
+
+def measure_neighbours(keys: Sequence[Key], known: Mapping[str, Module]) -> None:
+    """Halve and double every number that moves an answer, and add a row; old rows stay."""
+    for name in PRELOADED:
+        importlib.import_module(name)
+    effects, rows = read(), neighbours.read()
+    moving = [key for key in keys if key not in rows and (key not in effects or effects[key].moved)]
+    for key, cases in _cases(moving, known).items():
+        most = effects[key].where.partition(":")[0] if key in effects else ""
+        names = [name for name in cases if name in (*FIRST, most)]
+        half, double = (changed_answers([key], names, by) for by in (0.5, 2.0))
+        rows[key] = neighbours.neighbours(key, half, double)
+        neighbours.write(rows.values())
+        print(rows[key], flush=True)
+
+
+def _cases(keys: Sequence[Key], known: Mapping[str, Module]) -> dict[Key, list[str]]:
+    """Return the frozen cases that enter code with each number."""
+    entered = {name: set(apart(lambda name=name: _entering(name))) for name in ALL_CASES}  # type: ignore[misc]
+    acting = users(known.values())
+    return {
+        key: [name for name in entered if key not in acting or acting[key] & entered[name]]
+        for key in keys
+    }
 
 
 def _entering(name: str) -> list[str]:

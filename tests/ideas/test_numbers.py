@@ -114,11 +114,14 @@ def test_draw_is_of_what_tunes_nothing_and_repeats() -> None:
 def test_change_is_a_fifth_and_a_whole_number_stays_whole() -> None:
     assert [changed(x) for x in (10, 3, -3, 100)] == [12, 4, -4, 120]
     assert changed(0.5) == pytest.approx(0.6)
+    assert [changed(x, 0.5) for x in (10, 2, -3)] == [5, 1, -2]
+    assert [changed(0.95, by) for by in (1.2, 2.0)] == pytest.approx([0.94, 0.9])  # no 1.14
 
 
 @pytest.mark.parametrize(("file", "name", "value", "case", "kept"), [
     ("constants", "GRAVITY_MPS2", "9.80665", "trainer-pitch-aircraft", False),  # moves all
     ("progress", "_WIDTH", "32", "trainer-pitch-aircraft", True),  # width of a bar
+    ("reconstruction", "VANE_MODEL_SD", "0.006", "trainer-pitch-aircraft", True),  # as its room
     ("foreign.toml", "error.pot_scale.sigma", "0.03", "twin-multisine", False),  # read as text
 ])  # fmt: skip
 def test_changed_number_moves_an_answer_only_if_it_acts(
