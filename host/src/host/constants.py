@@ -17,10 +17,16 @@ EVEN_SD = 1.0 / math.sqrt(3.0)  # standard deviation of an even distribution ove
 # Weights fall beyond as many deviations; 95 % efficient on normal residuals: Huber, Robust
 # Statistics, 1981.
 HUBER_LIMIT = 1.345
-POSTERIOR_PRIOR_RATIO = 0.7  # of deviations: below it the data tell, above it what was known before
+# Posterior over prior deviation where data and what was known before have the same information, by
+# Bayes' rule for normal distributions: below it the data tell.
+POSTERIOR_PRIOR_RATIO = math.sqrt(0.5)
 CERTAIN_SD = 3.0  # deviations that chance exceeds once in 370 times
 SIGNIFICANCE = 0.01  # of a test: how often chance may reject what is right
 ENTANGLED = 0.9  # correlation of two estimates: what is wrong of one is wrong of both
+# Residuals and paths are judged in means over this long: of quicker samples an AR model of low
+# order cannot separate slow gusts from white noise, and a trainer moves far below 10 Hz.
+BLOCK_S = 0.05
+DRIFT_POWERS = 4  # of time, constant to cubic: drift and trend, with which no gust correlates
 STEEPEST_SINE = 0.5  # of a path; a steeper one is an error of the velocity down
 # 95 % half-width over an estimate, or over what would contribute 5 % of its row: up to the first it
 # is trusted, up to the second used with care. Everything that judges a width reads these two.

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
+from host.constants import DRIFT_POWERS
 from host.errors import IdentificationError
 from host.sysid.coefficients.aero_equations import KINEMATIC, LATERAL, LONGITUDINAL, Equation
 from host.sysid.reconstruction.inverse_sensor_model import Spectrum
@@ -18,8 +19,7 @@ from host.sysid.reconstruction.inverse_sensor_model import Spectrum
 LOW_HZ, HIGH_HZ = 0.1, 4.5
 KINEMATIC_LOW_HZ = 0.4  # below, the attitude filter's own errors dominate
 ROUNDING_SHARE = 1e-9  # a constant has no transform at whole periods but rounding
-# Powers of time removed: constant to cubic of kinematic equations, constant and slope of others.
-KINEMATIC_TREND, AERO_TREND = 4, 2
+AERO_TREND = 2  # powers of time removed, constant and slope; of kinematic equations `DRIFT_POWERS`
 SMOOTHING_HZ, GRID = 0.5, 12  # of residual spectra
 SHORTEST_S = 2.0  # shortest window
 EquationKey = tuple[str, int]  # equation, number of the window
@@ -100,7 +100,7 @@ def window_transform(
     frequency_hz = frequency_hz[frequency_hz >= LOW_HZ]
     phase = np.outer(frequency_hz, np.arange(n) * dt_s)
     cosines, sines = (f(2.0 * np.pi * phase) / np.sqrt(n) for f in (np.cos, np.sin))
-    trend = np.linspace(-1.0, 1.0, n)[:, None] ** np.arange(KINEMATIC_TREND)
+    trend = np.linspace(-1.0, 1.0, n)[:, None] ** np.arange(DRIFT_POWERS)
     trends = cosines @ trend - 1j * (sines @ trend)
     of_axis = (*forces, *LONGITUDINAL) if window.longitudinal else LATERAL
     known = {*of_axis} if fitted is None else {*fitted, *KINEMATIC}
@@ -141,7 +141,7 @@ def in_band(window: WindowTransform, equation: str) -> BoolArray:
 
 def trend_count(equation: str) -> int:
     """Return how many powers of time are removed from an equation."""
-    return KINEMATIC_TREND if equation in KINEMATIC else AERO_TREND
+    return DRIFT_POWERS if equation in KINEMATIC else AERO_TREND
 
 
 def equation_weight(frequency_hz: Array, noise: tuple[Array, Array] | None) -> Array:

@@ -15,6 +15,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import Condition
 from host.arrays import Array
+from host.constants import POSTERIOR_PRIOR_RATIO
 from host.instrument.deviations import unknown_sensors
 from host.instrument.error_list import NOT_PAID, ZERO, error_kinds
 from host.instrument.error_sources import ErrorSource, error_sources
@@ -31,7 +32,7 @@ from host.sysid.models.uncertainty import Uncertainty, consider_covariance
 from host.sysid.numerics.model_problems import output_problem
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.reconstruction.flight_path import PITOT
-from host.sysid.reconstruction.reconstruction import POSTERIOR_PRIOR_RATIO, Compatibility
+from host.sysid.reconstruction.reconstruction import Compatibility
 from host.sysid.reconstruction.sensor_corrections import (
     INSTANTANEOUS_ERRORS,
     correct_columns,

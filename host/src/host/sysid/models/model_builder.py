@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from host.constants import CERTAIN_SD
 from host.sysid.models.residual_delays import delays_of
 from host.sysid.models.state_space_model import (
     AccelerometerOffset,
@@ -15,8 +16,6 @@ from host.sysid.models.state_space_model import (
     Parameter,
     Term,
 )
-
-LIMIT_SD = 3.0  # deviations: the search of a place goes as far from the assumed one
 
 
 @dataclass(slots=True)
@@ -72,7 +71,7 @@ class ModelBuilder:
         """Add an accelerometer's offset from its assumed place, with a prior."""
         if sd_m > 0.0 and output in self.outputs and state in self.states:
             self.parameters[name] = Parameter(
-                name, 0.0, lower=-LIMIT_SD * sd_m, upper=LIMIT_SD * sd_m, prior_sd=sd_m
+                name, 0.0, lower=-CERTAIN_SD * sd_m, upper=CERTAIN_SD * sd_m, prior_sd=sd_m
             )
             self.accelerometer_offsets.append(AccelerometerOffset(output, state, name, gain))
 

@@ -29,7 +29,7 @@ import numpy as np
 from scipy import special
 
 from host.arrays import Array, BoolArray
-from host.constants import SIGNIFICANCE
+from host.constants import BLOCK_S, SIGNIFICANCE
 from host.sysid.numerics.ar_noise import HIGHEST_ORDER, ArNoise
 from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.input_drive import (
@@ -49,9 +49,6 @@ from host.sysid.numerics.simulator import Response
 
 SUSPICION = 0.10  # from here on intervals count that it may
 ROUNDS_WITHOUT, ROUNDS_WITH = 2, 3  # of the noise models: first without the added columns
-# Means over this long are tested: of quicker samples an AR model of low order cannot separate slow
-# gusts from a sensor's white noise.
-BLOCK_S = 0.05
 SHOWS = 0.1  # of the power of noise: a known error with less takes nothing of the residual
 
 
@@ -334,7 +331,7 @@ def block_means(values: Array, block: int, seen: BoolArray | None = None) -> Arr
     return np.asarray((blocks * weight).sum(axis=1) / np.maximum(weight.sum(axis=1), 1))
 
 
-FIRST_KNOT_S, LONGEST_S = 0.05, 3.2
+LONGEST_S = 3.2
 LAG_SHARE = 0.25  # of the shortest record: a longer memory is not seen often enough
 
 
@@ -349,7 +346,7 @@ def lag_knots_s(dt_s: float, shortest_s: float) -> Array:
         Length of the shortest record.
     """
     longest_s = min(LONGEST_S, LAG_SHARE * shortest_s)
-    knots = [0.0, max(FIRST_KNOT_S, dt_s)]
+    knots = [0.0, max(BLOCK_S, dt_s)]
     while 2.0 * knots[-1] <= longest_s:
         knots.append(2.0 * knots[-1])
     return np.array(knots)

@@ -15,8 +15,8 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
-from host.constants import GRAVITY_MPS2, NORMAL_95
-from host.sysid.reconstruction.reconstruction import POSTERIOR_PRIOR_RATIO, Compatibility
+from host.constants import GRAVITY_MPS2, NORMAL_95, POSTERIOR_PRIOR_RATIO
+from host.sysid.reconstruction.reconstruction import Compatibility
 
 TILT, BIAS = "imu_tilt_y_rad", "accel_x_bias_mps2"
 LEAST_S = 0.5  # of a standstill; our own log may begin a second before the launch

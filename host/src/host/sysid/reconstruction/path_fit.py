@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
+from host.constants import DRIFT_POWERS
 from host.errors import IdentificationError
 from host.sysid.numerics.ar_noise import ArNoise, fit_ar, lagged_moments
 from host.sysid.numerics.simulator import Response
@@ -49,7 +50,6 @@ PLAIN_STEP_LIMIT = 3.0  # of a standard error: they end
 AIR_PRIOR_WEIGHT = 1e4  # times the prior precision
 AIR_ERRORS = (*FLOW, *PITOT, *DELAYS, DELAY_DIFFERENCE, *PLACES)
 STEP_LIMIT = 0.05  # of a standard error: convergence
-DRIFT_POWERS = 4  # constants to cubics do not correlate with gusts either
 RIDGE = 1e-10  # of a column's power: a surface that never moved has none
 LARGEST_STEP = 4.0  # in prior deviations
 # Curvature that the equations leave out turns some steps back, each as long as the one before: two

@@ -16,7 +16,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
-from host.constants import GRAVITY_MPS2, NORMAL_95
+from host.constants import CERTAIN_SD, GRAVITY_MPS2, NORMAL_95, POSTERIOR_PRIOR_RATIO
 from host.errors import IdentificationError
 from host.instrument.deviations import SensorErrorModel
 from host.people_units import people_name
@@ -33,9 +33,6 @@ from host.sysid.reconstruction.path_preparation import (
     vane_delay_by_file,
 )
 
-# Posterior over prior deviation below which the data inform an error; above, the calibration does.
-POSTERIOR_PRIOR_RATIO = 0.7
-CONTRADICTION_SD = 3.0  # apart by more, the vanes are not those of the file
 VANE_MODEL_SD = 0.006  # of scale: dry friction known to 20 % of its 3 %
 # Without GPS only vanes and pitot, gusts included, determine the path: on eight flights rms errors
 # are up to 2.5 times the computed deviations, more for biases of the gyro.
@@ -308,7 +305,7 @@ def _known_better(estimate: tuple[float, float], by_file: tuple[float, float]) -
     to 1.5 ms, a file to 0.6; 1.7 ms too much makes Cm_q 3 % small.
     """
     (value, sd), (nominal, by) = estimate, by_file
-    agrees = abs(value - nominal) < CONTRADICTION_SD * np.hypot(sd, by)
+    agrees = abs(value - nominal) < CERTAIN_SD * np.hypot(sd, by)
     return bool(agrees and sd > POSTERIOR_PRIOR_RATIO * by)
 
 
