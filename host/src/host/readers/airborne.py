@@ -39,8 +39,8 @@ def airborne(found: Channels, not_flying: Sequence[Signal] = ()) -> Airborne:
     best = Airborne(0.0, 0.0, next(iter(speeds)))
     for by, (t_s, speed) in speeds.items():
         # A median over half a second: one wrong value is no flight.
-        width = max(3, round(0.5 / max(float(np.median(np.diff(t_s))), 1e-3)) | 1)
-        smooth = _median(speed, width)
+        half = max(1, round(0.25 / max(float(np.median(np.diff(t_s))), 1e-3)))
+        smooth = _median(speed, 2 * half + 1)
         flying = smooth > FLYING_MPS
         for other in not_flying:
             at = np.clip(np.searchsorted(other.t_s, t_s, side="right") - 1, 0, None)

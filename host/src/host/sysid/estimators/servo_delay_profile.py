@@ -13,14 +13,14 @@ from host.instrument.servo_prior import ServoPrior
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.ar_noise import fit_ar, lagged_moments
+from host.sysid.numerics.ar_noise import HIGHEST_ORDER, fit_ar, lagged_moments
 from host.sysid.numerics.input_coherence import block_length, block_means
 
 LEAST, MOST = (-0.15, 0.3, 0.2), (0.5, 60.0, 60.0)  # a delay, a bandwidth, a rate that can be
 SCAN_S = np.arange(-0.08, 0.241, 0.04)
-# Noise of output error: its memory, in means over this long; and what a model lacks at any
-# frequency, over the motion: whitened, calm air's small errors of the model would tell the delay.
-AR_ORDER, AR_STEP_S, LACK = 8, 0.02, 0.02
+# Means over this long have the noise of output error; and what a model lacks at any frequency,
+# over the motion: whitened, calm air's small errors of the model would tell the delay.
+AR_STEP_S, LACK = 0.02, 0.02
 # The third argument is a fit behind servos not far from these, to start from, or None.
 Fit = Callable[[LinearModel, Sequence[Maneuver], FitResult | None], FitResult]
 Behind = Callable[[tuple[float, float, float]], Sequence[Maneuver]]
@@ -127,10 +127,10 @@ def _cost(found: FitResult, data: Sequence[Maneuver]) -> float:
             )[:, 0]
             for r, m in zip(found.residuals, data, strict=True)
         ]
-        count = sum(len(r) - AR_ORDER for r in left)
+        count = sum(len(r) - HIGHEST_ORDER for r in left)
         none = [np.zeros((len(r), 0)) for r in left]
-        moments = lagged_moments(left, none, AR_ORDER)
-        moments += count * (LACK * motion[j]) ** 2 * np.eye(AR_ORDER + 1)
-        _, innovation = fit_ar(moments, AR_ORDER)
+        moments = lagged_moments(left, none, HIGHEST_ORDER)
+        moments += count * (LACK * motion[j]) ** 2 * np.eye(HIGHEST_ORDER + 1)
+        _, innovation = fit_ar(moments, HIGHEST_ORDER)
         total += 0.5 * count * float(np.log(max(innovation / count, 1e-300)))
     return total

@@ -184,7 +184,7 @@ def gauss_newton(
         # Nielsen, report IMM-REP-1999-05 (DTU): the damping follows the ratio of actual to
         # predicted decrease, because steps in a curved valley that merely succeed zigzag between
         # its walls.
-        damping *= max(0.2, 1.0 - (2.0 * gain_ratio - 1.0) ** 3)
+        damping *= max(1.0 / 3.0, 1.0 - (2.0 * gain_ratio - 1.0) ** 3)
         damping, growth = (damping if damping > MIN_DAMPING else 0.0), 2.0
         information, gradient = objective.normal(theta, trial)
     free = objective.free(theta, gradient)
