@@ -21,7 +21,7 @@ HUBER_LIMIT = 1.345
 # Bayes' rule for normal distributions: below it the data tell.
 POSTERIOR_PRIOR_RATIO = math.sqrt(0.5)
 CERTAIN_SD = 3.0  # deviations that chance exceeds once in 370 times
-SIGNIFICANCE = 0.01  # of a test: how often chance may reject what is right
+SIGNIFICANCE = 0.01  # of a test: how often chance may reject what is right (Fisher's 1 %)
 ENTANGLED = 0.9  # correlation of two estimates: what is wrong of one is wrong of both
 # Residuals and paths are judged in means over this long: of quicker samples an AR model of low
 # order cannot separate slow gusts from white noise, and a trainer moves far below 10 Hz.

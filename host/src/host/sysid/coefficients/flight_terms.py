@@ -20,7 +20,7 @@ from host.sysid.coefficients.window_spectra import Window
 from host.sysid.models.coefficient_model import DRAG, CoefficientModel
 
 SIDE = ("CY", "Cl", "Cn")
-STANDARD_DENSITY, DENSITY_SHARE = 1.225, 0.05  # kg/m3; up to 1000 m, 0 to 30 degrees C
+STANDARD_DENSITY, DENSITY_SHARE = 1.225, 0.05  # kg/m3; to 1000 m, 0 to 30 deg C: -6 +- 4 %
 # Columns that an axis which was not flown does without.
 SIDE_COLUMNS = (
     "beta_rad", "p_radps", "r_radps", "ay_mps2", "phi_rad", "aileron_rad", "rudder_rad",

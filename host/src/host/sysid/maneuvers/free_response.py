@@ -26,7 +26,7 @@ MOVED_NOISE = 5.0  # deviations of its noise; a pilot who holds the attitude mov
 REST_S = 0.5  # after the input, in which surfaces come to rest
 ENDS_S = 2.0
 LONGEST_S = 120.0
-SHORTEST_LEAD_S = 1.9  # a moment of rest is chance: a pilot holds still for as long
+SHORTEST_LEAD_S = 1.9  # less is chance: the pilot of the twin holds still for up to 1.7 s
 LONGEST_LEAD_S = 30.0  # of rest before the input, which tells of the constants
 
 

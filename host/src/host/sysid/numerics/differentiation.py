@@ -15,7 +15,7 @@ import numpy as np
 from host.arrays import Array
 from host.errors import IdentificationError
 
-POLYNOMIAL = 3
+POLYNOMIAL = 3  # the cubic of Savitzky & Golay
 SMALLEST_WINDOW = POLYNOMIAL + 2  # odd, and more samples than coefficients
 HEADROOM = 1.5  # bandwidth over the highest frequency at which a signal exceeds its noise
 SIGNAL_TO_FLOOR = 6.0  # power of a signal over the noise floor

@@ -332,7 +332,9 @@ def block_means(values: Array, block: int, seen: BoolArray | None = None) -> Arr
 
 
 LONGEST_S = 3.2
-LAG_SHARE = 0.25  # of the shortest record: a longer memory is not seen often enough
+# A share of the shortest record: a longer memory is not seen often enough (Box & Jenkins, Time
+# Series Analysis, 1970).
+LAG_SHARE = 0.25
 
 
 def lag_knots_s(dt_s: float, shortest_s: float) -> Array:
