@@ -12,7 +12,6 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
-import time
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -25,6 +24,7 @@ import pandas as pd
 
 import host
 from tests.bench import identify_log
+from tests.bench.fixed_work import seconds, unit_s
 
 ROOT = Path(__file__).resolve().parents[2]
 AIRCRAFT = "ultrastick25e"
@@ -37,22 +37,6 @@ COLUMNS = (
     "ay_mps2", "az_mps2", "phi_rad", "theta_rad", "psi_rad", "elevator_rad", "aileron_rad",
     "rudder_rad", "qbar_pa", "density_kgpm3",
 )  # fmt: skip
-
-
-def seconds(work: Callable[[], object]) -> float:
-    """Return the processor seconds of a call."""
-    begin_s = time.process_time()
-    work()
-    return time.process_time() - begin_s
-
-
-def fixed_work() -> float:
-    """Multiply and solve small matrices, as a search does: the unit of the last column."""
-    rng = np.random.default_rng(1)
-    small, wide, total = rng.standard_normal((4, 4)), rng.standard_normal((4, 2000)), 0.0
-    for _ in range(20000):
-        total += float(np.linalg.solve(small, small @ wide[:, :50])[0, 0] + (small @ wide)[0, 0])
-    return total
 
 
 def records(folder: Path) -> dict[str, Callable[[], object]]:
@@ -79,12 +63,12 @@ def records(folder: Path) -> dict[str, Callable[[], object]]:
 def main() -> int:
     """Print a line for each kind of record."""
     host.identify(FLOWN, mapping=THOR / "map.toml", from_s=241.0, methods="equation-error")
-    unit_s = seconds(fixed_work)
-    print(f"{'default answer to':<28}{'s':>8}{'units':>8}   (a unit: {unit_s:.2f} s)")
+    one_s = unit_s()
+    print(f"{'default answer to':<28}{'s':>8}{'units':>8}   (a unit: {one_s:.2f} s)")
     with tempfile.TemporaryDirectory() as name:
         for what, answer in records(Path(name)).items():
             took_s = seconds(answer)
-            print(f"{what:<28}{took_s:>8.2f}{took_s / unit_s:>8.2f}", flush=True)
+            print(f"{what:<28}{took_s:>8.2f}{took_s / one_s:>8.2f}", flush=True)
     return 0
 
 
