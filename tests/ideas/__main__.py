@@ -35,6 +35,7 @@ from tests.ideas.drawn import ALL_CASES, CASES, TOGETHER, drawn
 from tests.ideas.effects import read as read_effects
 from tests.ideas.entered import Entered, entered, simulated, total_calls
 from tests.ideas.literals import Key, code_literals, toml_files, toml_literals
+from tests.ideas.neighbours import NOTHING, WORSE
 from tests.ideas.sources import (
     ROOT,
     Function,
@@ -121,6 +122,8 @@ def _print_numbers(keys: list[Key], rows: dict[Key, Row]) -> int:
     _row("tuned numbers with a source", sourced, f"of {len(tuned)}")
     sourced = sum(bool(tuned[key].source) for key in moving)
     _row("tuned numbers that move a frozen answer", len(moving), f"{sourced} of them with a source")
+    worse, nothing = (sum(tuned[key].source == one for key in moving) for one in (WORSE, NOTHING))
+    _row("of these, half or double is worse", worse, f"{nothing} more where they decide nothing")
     bare, gone = missing(keys, rows), stale(keys, rows)
     for key in bare:
         print(f"no class: {key.file} {key.name} {key.value}", file=sys.stderr)
