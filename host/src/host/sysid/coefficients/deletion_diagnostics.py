@@ -21,7 +21,6 @@ from host.sysid.coefficients.window_spectra import (
     EquationKey,
     WindowTransform,
     equation_weight,
-    in_band,
 )
 from host.sysid.reconstruction.inverse_sensor_model import Spectrum
 
@@ -123,11 +122,10 @@ def _sums_of_squares(
     final: FinalStep, block: EquationBlock, window: WindowTransform, steps: tuple[Array, Array]
 ) -> Array:
     """Return sums of squares, (3,): residual after each of two steps, and response."""
-    kept = in_band(window, block.equation)
     noise = final.noise.get(block.equation)
-    weight = np.tile(equation_weight(window.frequency_hz[kept], noise), 2)
-    trends = window.trends[kept, :AERO_TREND]
-    response = final.spectra[block.equation, block.window][kept, 0]
+    weight = np.tile(equation_weight(window.frequency_hz, noise), 2)
+    trends = window.trends[:, :AERO_TREND]
+    response = final.spectra[block.equation, block.window][:, 0]
     trend = np.concatenate([trends.real, trends.imag])
     gusts = final.unknowns.coefficients + np.arange(final.unknowns.gusts)
     shared_columns = ~np.isin(block.unknown_indices, gusts)  # a slow gust is the maneuver's own

@@ -19,7 +19,6 @@ from host.sysid.coefficients.window_spectra import (
     EquationKey,
     WindowTransform,
     equation_weight,
-    in_band,
     trend_count,
 )
 from host.sysid.reconstruction.inverse_sensor_model import Spectrum
@@ -162,21 +161,17 @@ def equation_blocks(
     for number, window in enumerate(windows):
         for name in window.equations:
             key = name, number
-            kept = in_band(window, name)
-            weight = equation_weight(window.frequency_hz[kept], noise.get(name))
+            weight = equation_weight(window.frequency_hz, noise.get(name))
             indices = [unknowns.positions[name]]
             if key in measured.gusts:
                 before, after = after, after + measured.gusts[key].shape[1]
                 indices.append(np.arange(before, after))
             if measured.slopes:
                 indices.append(errors)
-            A, Z = (
-                _real(_columns(side, key)[kept] * weight[:, None])
-                for side in (measured, noise_free)
-            )
+            A, Z = (_real(_columns(side, key) * weight[:, None]) for side in (measured, noise_free))
             spectrum = measured.spectra[key]
             residual = spectrum[:, 0] - spectrum[:, 1:] @ coefficients[name]
-            trend = _real(window.trends[kept, : trend_count(name)] * weight[:, None])
+            trend = _real(window.trends[:, : trend_count(name)] * weight[:, None])
             found.append(
                 EquationBlock(
                     name,
@@ -184,7 +179,7 @@ def equation_blocks(
                     np.concatenate(indices),
                     A,
                     Z,
-                    _real(residual[kept] * weight),
+                    _real(residual * weight),
                     _orthonormal(trend),
                 )
             )

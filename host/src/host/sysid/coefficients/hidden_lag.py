@@ -20,7 +20,7 @@ from host.constants import SIGNIFICANCE
 from host.sysid.coefficients.coefficient_fit import Derivative
 from host.sysid.coefficients.coefficient_intervals import SearchResult
 from host.sysid.coefficients.equation_blocks import EquationBlock
-from host.sysid.coefficients.window_spectra import equation_weight, in_band
+from host.sysid.coefficients.window_spectra import equation_weight
 
 MOMENTS = ("Cl", "Cm", "Cn")
 SURFACES = ("de", "da", "dr")
@@ -107,9 +107,8 @@ def _instrumented(columns: Array, instruments: Array, left: Array) -> tuple[Arra
 def _lag_columns(search: SearchResult, block: EquationBlock, moved: Sequence[int]) -> Array:
     """Return the slopes of surfaces in one block, weighted as it is, (2 F, surfaces)."""
     window = search.problem.windows[block.window]
-    kept = in_band(window, block.equation)
-    frequency_hz = window.frequency_hz[kept]
+    frequency_hz = window.frequency_hz
     weight = equation_weight(frequency_hz, search.final.noise.get(block.equation))
-    spectrum = search.final.spectra[block.equation, block.window][kept][:, [1 + k for k in moved]]
+    spectrum = search.final.spectra[block.equation, block.window][:, [1 + k for k in moved]]
     slope = spectrum * (2j * np.pi * frequency_hz * weight)[:, None]
     return block.without_trend(np.concatenate([slope.real, slope.imag]))

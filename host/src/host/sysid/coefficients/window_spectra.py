@@ -10,17 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.arrays import Array, BoolArray, IntArray
+from host.arrays import Array, IntArray
 from host.constants import DRIFT_POWERS
 from host.errors import IdentificationError
 from host.sysid.coefficients.aero_equations import KINEMATIC, LATERAL, LONGITUDINAL, Equation
 from host.sysid.reconstruction.inverse_sensor_model import Spectrum
 
 LOW_HZ, HIGH_HZ = 0.1, 4.5
-KINEMATIC_LOW_HZ = 0.4  # below, the attitude filter's own errors dominate
 ROUNDING_SHARE = 1e-9  # a constant has no transform at whole periods but rounding
 AERO_TREND = 2  # powers of time removed, constant and slope; of kinematic equations `DRIFT_POWERS`
-SMOOTHING_HZ, GRID = 0.5, 12  # of residual spectra
+SMOOTHING_HZ, GRID = 1.0, 12  # of residual spectra
 SHORTEST_S = 2.0  # shortest window
 EquationKey = tuple[str, int]  # equation, number of the window
 ResidualSpectra = Mapping[str, tuple[Array, Array]]  # by equation: frequency (Hz) and spectrum
@@ -134,11 +133,6 @@ def equation_spectra(
     return result
 
 
-def in_band(window: WindowTransform, equation: str) -> BoolArray:
-    """Return which frequencies of a window an equation is compared at, (F,)."""
-    return window.frequency_hz >= (KINEMATIC_LOW_HZ if equation in KINEMATIC else LOW_HZ)
-
-
 def trend_count(equation: str) -> int:
     """Return how many powers of time are removed from an equation."""
     return DRIFT_POWERS if equation in KINEMATIC else AERO_TREND
@@ -177,7 +171,7 @@ def residual_spectra(
     """
     found: dict[str, list[tuple[Array, Array]]] = {}
     for (name, number), residual in residuals:
-        frequency_hz = windows[number].frequency_hz[in_band(windows[number], name)]
+        frequency_hz = windows[number].frequency_hz
         power = 0.5 * np.sum(residual.reshape(2, -1) ** 2, axis=0)
         if name in before:
             power = power * np.interp(frequency_hz, *before[name])

@@ -8,24 +8,29 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array
+from host.constants import CERTAIN_SD
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import DelayGroup, LinearModel
 
 # Prior deviation of the delay that remains of each sensor once the nominal one is removed, s.
 STANDARD_DELAYS = (
-    DelayGroup("delay_vanes_s", ("alpha_rad", "beta_rad"), prior_sd_s=0.010, limit_s=0.03),
+    DelayGroup(
+        "delay_vanes_s", ("alpha_rad", "beta_rad"), prior_sd_s=0.010, limit_s=CERTAIN_SD * 0.010
+    ),
     DelayGroup(
         "delay_imu_s",
         ("p_radps", "q_radps", "r_radps", "ax_mps2", "ay_mps2", "az_mps2"),
         prior_sd_s=0.002,
         limit_s=0.01,
     ),
-    DelayGroup("delay_attitude_s", ("phi_rad", "theta_rad"), prior_sd_s=0.010, limit_s=0.03),
+    DelayGroup(
+        "delay_attitude_s", ("phi_rad", "theta_rad"), prior_sd_s=0.010, limit_s=CERTAIN_SD * 0.010
+    ),
     DelayGroup("delay_pitot_s", ("airspeed_mps",), prior_sd_s=0.015, limit_s=0.05),
 )
 # Vanes of others have a delay that nobody removed: 10 to 40 ms behind the gyro of the same row.
 OTHERS_DELAYS = (
-    replace(STANDARD_DELAYS[0], prior_sd_s=0.020, limit_s=0.06),
+    replace(STANDARD_DELAYS[0], prior_sd_s=0.020, limit_s=CERTAIN_SD * 0.020),
     *STANDARD_DELAYS[1:],
 )
 
