@@ -317,12 +317,6 @@ SWITCHES = (
         argument(2),
     ),
     _one(
-        "other delays",
-        "searches controls a sample earlier or later",
-        "estimators.multistart:_with_other_delays",
-        argument(1),
-    ),
-    _one(
         "homotopy",
         "starts searches from a stabilised model",
         "estimators.homotopy:homotopy_start",

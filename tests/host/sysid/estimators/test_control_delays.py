@@ -1,4 +1,4 @@
-"""The delay of a command: found where the search from no delay ends beside a whole sample."""
+"""The delay of a command, in records of two rates, a servo behind it."""
 
 from pathlib import Path
 
@@ -60,10 +60,7 @@ def _record(model: LinearModel, dt_s: float, seed: int, truth: list[float]) -> M
 
 @pytest.mark.parametrize("late_s", [0.04, 0.03])
 def test_two_rates_find_the_servo(late_s: float, tmp_path: Path) -> None:
-    """A search that ended where it first stood still had 20 ms and a bandwidth of 70 rad/s.
-
-    Late by three quarters of a sample of 40 ms, spread over it: 34.5 ms, max_rate 0.84 +- 0.01.
-    """
+    """Late by whole samples and by three quarters of one: a quicker servo makes up for a part."""
     path = tmp_path / "servo.toml"
     path.write_text(TEXT, encoding="utf-8")
     model, truth = read_model(path), [*TRUTH[:-1], late_s]

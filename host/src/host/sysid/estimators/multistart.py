@@ -9,7 +9,6 @@ instruments.
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -39,7 +38,6 @@ EXCESS_POWER = 2.0  # residual over white-noise power: above it other starts are
 MOST_STARTS = 4  # further searches
 LAST_SEARCH_ITERATIONS = 200  # where none of them has converged
 LEAST_SAMPLES = 50
-LEAST_GAIN = 1.0  # of a cost: less is no other minimum
 
 
 def multistart(
@@ -47,8 +45,7 @@ def multistart(
 ) -> Optimum:
     """Return the best optimum of white-noise output error found from `theta` and other starts.
 
-    For equations of a user it is the one that is reached from `theta`, or next to it by the delay
-    of a control.
+    For equations of a user it is the one that is reached from `theta`.
 
     Parameters
     ----------
@@ -68,8 +65,7 @@ def multistart(
         If no start is finite over the maneuvers.
     """
     if has_equations(problem.model):
-        reached = minimise(problem, theta, max_iterations=LAST_SEARCH_ITERATIONS)
-        return _with_other_delays(problem, reached)
+        return minimise(problem, theta, max_iterations=LAST_SEARCH_ITERATIONS)
     if not restarts:
         return minimise(problem, theta)
     best, failure = _try(problem, None, theta)
@@ -102,33 +98,6 @@ def _from_other_starts(
     if known is None or not _residuals_are_noise(problem, known):
         for start in _starts(problem, theta, known)[:MOST_STARTS]:
             best, _ = _try(problem, best, start)
-    return best
-
-
-def _with_other_delays(problem: OutputProblem, best: Optimum) -> Optimum:
-    """Return the best optimum whose controls are samples earlier or later than those of `best`.
-
-    Each whole sample bends the cost over a delay, and a quicker servo makes up for a part of it.
-    In records of 20 and 40 ms a sample a servo 40 ms late is found 20 ms late otherwise, with a
-    bandwidth of 70 rad/s in place of 22.
-    """
-    controls = {*problem.model.controls()}
-    late = [d.name for d in problem.model.delays if controls & {*d.outputs}]
-    periods_s = sorted({round(m.dt_s, 3) for m in problem.maneuvers})
-    steps_s = [sign * dt_s for dt_s in periods_s for sign in (1.0, -1.0)]
-    for column in map(problem.names.index, late):
-        left = len(steps_s)
-        for step_s in itertools.cycle(steps_s):
-            start = best.theta.copy()
-            start[column] += step_s
-            if problem.lower[column] < start[column] < problem.upper[column]:
-                found, _ = _try(problem, best, start)
-                assert found is not None
-                left = len(steps_s) + 1 if found.cost < best.cost - LEAST_GAIN else left
-                best = found
-            left -= 1
-            if left == 0:
-                break
     return best
 
 
