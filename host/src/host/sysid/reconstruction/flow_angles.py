@@ -17,7 +17,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
-from host.constants import GRAVITY_MPS2, NORMAL_95
+from host.constants import BLOCK_S, GRAVITY_MPS2, NORMAL_95
 from host.errors import IdentificationError
 from host.sysid.reconstruction.flight_path import GPS, WITH_GPS
 from host.sysid.reconstruction.linear_smoother import Step, smooth
@@ -25,7 +25,6 @@ from host.sysid.reconstruction.path_preparation import gps_fixes
 from host.sysid.reconstruction.reconstruction import Compatibility
 from host.sysid.reconstruction.strapdown import rotation, rotation_from_vector
 
-STEP_S = 0.04
 PASSES = 3
 LONGEST_S = 600.0  # of a flight that is looked at: 16 s of processor time
 TILTS = ("imu_tilt_y_rad", "imu_tilt_z_rad")  # of the IMU in the aircraft: no sensor sees it
@@ -193,7 +192,7 @@ class _Record:
 
 def _record(columns: Mapping[str, Array], found: Compatibility, airframe: AirframeData) -> _Record:
     t = columns["t_s"]
-    block = max(1, round(STEP_S / float(t[1] - t[0])))
+    block = max(1, round(BLOCK_S / float(t[1] - t[0])))
     rows = len(t) // block
     if rows < 2:
         raise IdentificationError("flow angles are not reconstructed: nothing flew")

@@ -30,7 +30,6 @@ from host.sysid.numerics.simulator import Response
 from host.sysid.validation.free_simulation import FreeResponses, weighted_fit
 
 DRAWS, DRAW_SEED = 100, 2  # 50 to 200 are enough: Efron & Tibshirani, An Introduction, sec. 6.4
-AR_DRAWS = 12  # of them give the AR model of what is predicted
 
 
 def excess_over_noise_model(
@@ -65,8 +64,8 @@ def excess_over_noise_model(
         left = block_means(problem.residual(number, response.y).T, block, maneuver.sampled)
         slopes = slopes_of_means(problem, number, response)[:, :, problem.n_common :]
         errors_drawn = random_errors(rng, wide, free.theta, result, maneuver, block)
-        for j, errors in enumerate(errors_drawn[:, :, :AR_DRAWS]):
-            none = [np.zeros((len(errors), 0))] * AR_DRAWS
+        for j, errors in enumerate(errors_drawn):
+            none = [np.zeros((len(errors), 0))] * DRAWS
             moments[j] += lagged_moments(list(errors.T), none, HIGHEST_ORDER)
         weight = 1.0 / np.maximum(np.mean(errors_drawn**2, axis=(1, 2)), 1e-300)
         errors_drawn -= slopes @ weighted_fit(errors_drawn, slopes, weight)
@@ -83,7 +82,7 @@ def excess_over_noise_model(
     if not power:
         return None
     fitted = [fit_ar(m, HIGHEST_ORDER) for m in moments]
-    count = AR_DRAWS * (samples - HIGHEST_ORDER * len(maneuvers))
+    count = DRAWS * (samples - HIGHEST_ORDER * len(maneuvers))
     noise = [ArNoise.from_coefficient(coefficient) for coefficient, _ in fitted]
     variance = np.array([innovation / count for _, innovation in fitted])
     return NoiseExcess(power, variance_ratio(problem, responses, noise, variance, power))
