@@ -47,9 +47,9 @@ class Neighbours:
 
     @property
     def source(self) -> str:
-        """What the scores say for the number; empty where half or double is better."""
+        """What the scores say for the number; empty where no truth is known, or one is better."""
         scores = (self.half_score, self.double_score)
-        if min(scores) < 1.0 - TOLERANCE:
+        if not self.held or min(scores) < 1.0 - TOLERANCE:
             return ""
         return WORSE if max(scores) > 1.0 + TOLERANCE else NOTHING
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,7 @@ def test_a_number_stands_where_neither_neighbour_is_better(
     half: float, double: float, source: str
 ) -> None:
     assert row(half, double).source == source
+    assert replace(row(half, double), held=0).source == ""  # no truth is known
 
 
 def test_a_row_is_made_of_what_both_do_and_read_as_written(tmp_path: Path) -> None:

@@ -127,7 +127,7 @@ def sensor_error_model(
 def unknown_sensors(
     recording: Recording | None = None, calibration: Calibration | None = None
 ) -> SensorErrorModel:
-    """Return the sensors of an aircraft without a file: typical dynamics, places at the CG.
+    """Return the sensors of an aircraft without a file: dynamics of airframes/*.toml, at the CG.
 
     Their errors are those of `errors_without_file`.
     """
@@ -135,7 +135,7 @@ def unknown_sensors(
     recording = recording or Recording()
     errors = errors_without_file(recording.maker, calibration)
     return SensorErrorModel(
-        nowhere, nowhere, upwash=0.0, vane_hz_per_mps=1.0, vane_damping=0.1,
+        nowhere, nowhere, upwash=0.0, vane_hz_per_mps=0.8, vane_damping=0.35,
         vane_friction_rad=0.0, friction_speed_mps=1.0, pitot_lag_s=0.010,
         errors=errors, recording=recording,
     )  # fmt: skip
