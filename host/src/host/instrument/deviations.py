@@ -23,9 +23,8 @@ from host.physical.recording import FOREIGN, OWN, Recording
 
 LEAST_LAG_S = 1e-5  # stands for no low-pass at all, so that its bandwidth stays finite
 LEAST_CLOCK_SHARE = 1e-5  # GPS leaves 0.2 ppm, far too little to change an interval
-# The delay of the vanes of airframes/*.toml at 14 m/s, give or take as much; the error of a
-# filter's model is a share of it.
-VANE_DELAY_S = 0.010
+# Delay of the vanes of airframes/*.toml at 17 m/s, of which the filter model's error is a share.
+VANE_DELAY_S = 8e-3
 VANES = {"alpha": ("alpha_a", "alpha_b"), "beta": ("beta_a", "beta_b")}
 POTS = {
     "elevator": ("pot_elevator",),

@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 
 from host.arrays import Array
-from host.constants import OPEN_SHARE
 from host.sysid.coefficients.aero_equations import KINEMATIC
 from host.sysid.coefficients.coefficient_fit import (
     CoefficientFit,
@@ -44,10 +43,11 @@ from host.sysid.coefficients.trim_derivatives import (
 from host.sysid.models.uncertainty import Uncertainty, consider_covariance
 from host.sysid.numerics.maneuver_agreement import ManeuverAgreement, scatter_test
 
-# A roll rate follows the aileron so closely that instrumental variables are weak: on fourteen
-# flights of an independent simulator whose air rolls at 0.5 and 1 m/s Cl_p is 0.08 to 0.24 of the
-# truth by least squares, and 0.65 to 0.99 by them: they leave `OPEN_SHARE` of what they moved. In
-# light turbulence they move it by 7 %.
+# One deviation of the error that instrumental variables leave, as a share of what they moved. A
+# roll rate follows the aileron so closely that they are weak: on fourteen flights of an independent
+# simulator whose air rolls at 0.5 and 1 m/s Cl_p is 0.08 to 0.24 of the truth by least squares, and
+# 0.65 to 0.99 by them. In light turbulence they move it by 7 %.
+MOVED_SHARE = 0.25
 LEAST_MOVED = 0.3  # of a coefficient: below, air neither pitches nor rolls
 MOVED_BY_AIR = ("Cm_alpha", "Cm_q", "Cl_p", "Cl_da", "Cn_beta", "Cn_r")
 
@@ -95,7 +95,7 @@ class SearchResult:
         if not self.least_squares_shares:
             return own
         left = np.zeros(len(own))
-        left[: len(self.theta)] = OPEN_SHARE * self.moved_from_least_squares
+        left[: len(self.theta)] = MOVED_SHARE * self.moved_from_least_squares
         return own + consider_covariance(left[None])
 
     @property

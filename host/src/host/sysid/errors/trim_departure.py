@@ -23,7 +23,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
-from host.constants import EVEN_SD, OPEN_SHARE
+from host.constants import EVEN_SD
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
 from host.sysid.aerodynamics.left_out_terms import (
     NEEDED,
@@ -42,6 +42,7 @@ from host.sysid.models.rate_forces import has_rate_forces
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
 
+REMAINDER_SHARE = 0.25  # of the step: what one step and terms of second order leave open
 DEPARTURES = "departures from the linear model"
 DRAG_POLAR = "curvature of the drag polar"
 THRUST_ACTS = "curvature of the drag polar, and what thrust does"
@@ -179,7 +180,7 @@ def correct_trim_departure(
         return None
     moved = result.estimate + found.shares.sum(axis=0)
     open_ones = [
-        (DEPARTURES, OPEN_SHARE * found.shares.sum(axis=0)),
+        (DEPARTURES, REMAINDER_SHARE * found.shares.sum(axis=0)),
         *((departing.cause, shift) for shift in _root(found.covariance) @ found.by_added),
     ]
     return departing.found(

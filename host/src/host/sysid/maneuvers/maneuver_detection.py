@@ -151,10 +151,10 @@ def _parts(item: DetectedManeuver, t: Array, measured: BoolArray) -> list[Detect
     parts = []
     for samples in runs_of(measured & inside):
         first_s, last_s = float(t[samples[0]]), float(t[samples[-1]])
-        if last_s - first_s >= SHORTEST_PART_S:
-            begin_s, lead_s = item.start_s, item.lead_s
-            if first_s > begin_s:
-                begin_s, lead_s = first_s + TRIM_S, TRIM_S
+        begin_s, lead_s = item.start_s, item.lead_s
+        if first_s > begin_s:
+            begin_s, lead_s = first_s + TRIM_S, TRIM_S
+        if last_s - begin_s >= SHORTEST_PART_S:
             input_end_s = float(np.clip(item.input_end_s, begin_s, last_s))
             part = replace(item, start_s=begin_s, input_end_s=input_end_s, end_s=last_s)
             parts.append(replace(part, lead_s=lead_s))

@@ -13,7 +13,6 @@ from host.arrays import Array, BoolArray
 from host.constants import BLOCK_S
 from host.errors import IdentificationError
 from host.instrument.deviations import (
-    VANE_DELAY_S,
     SensorErrorModel,
     deviations,
     unknown_sensors,
@@ -61,9 +60,9 @@ SMOOTHED = "airspeed_mps smoothed"
 NO_OFFSETS = AirframeData("nothing but places", 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0)
 FLYING_SHARE = 0.5  # of the median airspeed
 FIX_BEND_MPS = 1e-6
-# Not in any calibration: deviation of the steady wind, mean and deviation of a delay. PX4 takes 110
-# ms for GPS (EKF2_GPS_DELAY), ArduPilot 120 to 220 ms (AP_GPS_UBLOX::get_lag).
+# Not in any calibration: deviation of the steady wind, mean and deviation of delays.
 WIND_SD_MPS = 10.0
+VANE_DELAY_S = (0.010, 0.010)
 GPS_DELAY_S = (0.10, 0.08)
 
 
@@ -215,9 +214,9 @@ def prior(
     expected = {FLOW[0]: flow, FLOW[2]: flow}
     result |= {name: (expected.get(name, 0.0), known[name]) for name in (*FLOW, *PITOT)}
     pitot = (i.pitot_lag_s, max(i.pitot_lag_s, sd["pitot_delay_s"]))
-    result |= dict(zip(DELAYS, ((VANE_DELAY_S, VANE_DELAY_S), pitot), strict=True))
+    result |= dict(zip(DELAYS, (VANE_DELAY_S, pitot), strict=True))
     # As two pairs differ: as the places of the vanes it turned up, up to five deviations of them.
-    result[DELAY_DIFFERENCE] = (0.0, math.sqrt(2.0) * vane_delay_s(i, VANE_DELAY_S))
+    result[DELAY_DIFFERENCE] = (0.0, math.sqrt(2.0) * vane_delay_s(i, VANE_DELAY_S[0]))
     # Both were measured from the same point, so the position of the CG does not matter.
     place = float(np.hypot(sd["imu_x_m"], sd["vane_x_m"]))
     ahead = (e["vane_ahead_m"].mean, 0.0)
