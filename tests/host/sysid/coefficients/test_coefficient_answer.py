@@ -170,9 +170,9 @@ def test_aileron_and_rudder_flown_together_are_one_window() -> None:
         ]
     )
     assert [(w.first_s, w.last_s, w.longitudinal) for w in windows] == [
-        (39.0, 63.0, True),
-        (9.0, 33.0, False),
-        (69.0, 80.0, False),
+        (39.5, 63.0, True),
+        (9.5, 33.0, False),
+        (69.5, 80.0, False),
     ]
 
 

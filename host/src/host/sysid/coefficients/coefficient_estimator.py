@@ -43,12 +43,7 @@ from host.sysid.flight.reconstructed_flight import (
     ReconstructedFlight,
     maneuver_name,
 )
-from host.sysid.maneuvers.maneuver_detection import (
-    FLYING_SHARE,
-    LEAD_S,
-    TRIM_S,
-    DetectedManeuver,
-)
+from host.sysid.maneuvers.maneuver_detection import FLYING_SHARE, TRIM_AFTER_GAP_S, DetectedManeuver
 from host.sysid.models.coefficient_model import BODY, WIND, CoefficientModel, standard_model
 from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.uncertainty import dominant_error_source
@@ -248,17 +243,11 @@ class CoefficientEstimator:
 
 
 def _fits_in(found: DetectedManeuver, t: Array) -> bool:
-    """Return whether a maneuver of a surface, the trim of a fit before it, lies in a record."""
-    least_s = found.start_s - (0.0 if found.given else LEAD_S)
-    long_enough = found.end_s - max(_first_s(found), float(t[0])) >= SHORTEST_S
-    inside = t[0] <= least_s and found.end_s <= t[-1]
+    """Return whether a maneuver of a surface, its trim before it, lies in a record's time."""
+    first_s = found.start_s - (0.0 if found.given else TRIM_AFTER_GAP_S)
+    long_enough = found.end_s - found.start_s + TRIM_AFTER_GAP_S >= SHORTEST_S
+    inside = t[0] <= first_s and found.end_s <= t[-1]
     return found.axis != "throttle" and long_enough and bool(inside)
-
-
-def _first_s(found: DetectedManeuver) -> float:
-    """Return how far back from a maneuver a fit reaches: a stretch that the user gave, to its
-    begin."""
-    return found.start_s - (found.lead_s if found.given else TRIM_S)
 
 
 def coefficient_estimator(
@@ -282,7 +271,7 @@ def merged_windows(found: Sequence[DetectedManeuver]) -> list[Window]:
     windows: list[Window] = []
     for item in sorted(found, key=lambda f: (f.axis != "elevator_rad", f.start_s)):
         along = item.axis == "elevator_rad"
-        first, last = _first_s(item), item.end_s
+        first, last = item.start_s - TRIM_AFTER_GAP_S, item.end_s
         if windows and not along and not windows[-1].longitudinal:
             before = windows[-1]
             if first < before.last_s - SHORTEST_S:

@@ -32,11 +32,12 @@ AWAY = 0.3  # of an input, or of the answer to it: what is further from its rest
 OUT = 0.4  # of an input: the surface stands at one side
 PARTING_GAP_S = 5.0
 SHORTEST_PART_S = 1.0  # of a maneuver that a gap divides
+TRIM_AFTER_GAP_S = 0.5  # fits of coefficients reach as far back from the start
 FEWEST = 8  # samples, as a maneuver needs
 STEADY_TREND = 0.6  # rank correlation of swing length with order: a sweep's swings shorten
 RESPONSE_S = 3.0  # the window reaches this long past the last edge
 LEAD_S = 0.3  # of trim before the input, in a fit
-TRIM_S = 1.0  # quiet time before the input, as far back as fits of coefficients reach
+TRIM_S = 1.0  # quiet time before the input
 FLYING_SHARE = 0.5  # of the median airspeed: slower is not flight
 AXES = ("elevator_rad", "aileron_rad", "rudder_rad", "throttle")
 RESPONSE_OF = {
@@ -151,13 +152,10 @@ def _parts(item: DetectedManeuver, t: Array, measured: BoolArray) -> list[Detect
     parts = []
     for samples in runs_of(measured & inside):
         first_s, last_s = float(t[samples[0]]), float(t[samples[-1]])
-        begin_s, lead_s = item.start_s, item.lead_s
-        if first_s > begin_s:
-            begin_s, lead_s = first_s + TRIM_S, TRIM_S
-        if last_s - begin_s >= SHORTEST_PART_S:
+        if last_s - first_s >= SHORTEST_PART_S:
+            begin_s = item.start_s if first_s <= item.start_s else first_s + TRIM_AFTER_GAP_S
             input_end_s = float(np.clip(item.input_end_s, begin_s, last_s))
-            part = replace(item, start_s=begin_s, input_end_s=input_end_s, end_s=last_s)
-            parts.append(replace(part, lead_s=lead_s))
+            parts.append(replace(item, start_s=begin_s, input_end_s=input_end_s, end_s=last_s))
     return parts
 
 

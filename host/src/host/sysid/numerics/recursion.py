@@ -81,7 +81,8 @@ def propagate(
     S, T = start_sensitivities.copy(), np.empty_like(start_sensitivities)
     for begin in range(0, samples, BLOCK):
         count = min(BLOCK, samples - begin)
-        np.dot(z[begin : begin + count], flat, out=forcing[:count])
+        with np.errstate(over="ignore", invalid="ignore"):  # a model that diverges is told so
+            np.dot(z[begin : begin + count], flat, out=forcing[:count])
         propagate_block(F, C, S, T, forcing, begin, count, out)
 
 
