@@ -32,10 +32,12 @@ from tests.ideas.classes import (
 )
 from tests.ideas.declared import Kind, kinds
 from tests.ideas.drawn import ALL_CASES, CASES, TOGETHER, drawn
-from tests.ideas.effects import read as read_effects
+from tests.ideas.effects import TABLE as EFFECTS
+from tests.ideas.effects import Effect
 from tests.ideas.entered import Entered, entered, simulated, total_calls
 from tests.ideas.literals import Key, code_literals, toml_files, toml_literals
 from tests.ideas.neighbours import NOTHING, WORSE
+from tests.ideas.rows import read_rows
 from tests.ideas.sources import (
     ROOT,
     Function,
@@ -116,7 +118,7 @@ def _print_numbers(keys: list[Key], rows: dict[Key, Row]) -> int:
     listed = ", ".join(f"{kind} {of_class[kind]}" for kind in (*CLASSES, OPEN) if of_class[kind])
     _row("numbers that host.identify can reach", len(keys), listed)
     tuned = {k: row for k in keys if (row := row_of(k, rows)) and row.kind == "tuned"}
-    effects = read_effects()
+    effects = read_rows(Effect, EFFECTS)
     moving = [key for key in tuned if key not in effects or effects[key].moved]
     sourced = sum(bool(row.source) for row in tuned.values())
     _row("tuned numbers with a source", sourced, f"of {len(tuned)}")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import astuple, dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from tests.ideas.literals import Key
+from tests.ideas.rows import NumberRow
 
 TOLERANCE = 1e-2  # of a half-width, as between two machines: a search ends that near to its minimum
 Again = dict[str, Any]  # a case: its frozen answer `old`, `new`, and `lines` of what moved
@@ -17,13 +18,11 @@ UNKNOWN = 1e3  # half-width of what the data say nothing about
 
 
 @dataclass(frozen=True)
-class Effect:
+class Effect(NumberRow):
     """What a fifth more of a number does.
 
     Attributes
     ----------
-    file, name, value : str
-        The number (`Key`).
     cases, moved : int
         Frozen cases that were answered again; of them those whose answer moved.
     most : float
@@ -36,9 +35,6 @@ class Effect:
         Sum of their interval scores over the sum before: below 1 the change is for the better.
     """
 
-    file: str
-    name: str
-    value: str
     cases: int
     moved: int
     most: float
@@ -46,28 +42,6 @@ class Effect:
     held_before: int
     held: int
     score: float
-
-    @property
-    def key(self) -> Key:
-        """The number."""
-        return Key(self.file, self.name, self.value)
-
-
-def read(table: Path = TABLE) -> dict[Key, Effect]:
-    """Return the rows of the table; none where there is no table."""
-    if not table.is_file():
-        return {}
-    kinds = [{"int": int, "float": float}.get(str(one.type), str) for one in fields(Effect)]
-    rows = (line.split("\t") for line in table.read_text(encoding="utf-8").splitlines()[1:])
-    found = (Effect(*(kind(c) for kind, c in zip(kinds, row, strict=True))) for row in rows)
-    return {one.key: one for one in found}
-
-
-def write(rows: Iterable[Effect], table: Path = TABLE) -> None:
-    """Write the table, sorted by number."""
-    head = [one.name for one in fields(Effect)]
-    lines = [head, *(map(str, astuple(row)) for row in sorted(rows, key=lambda row: row.key))]
-    table.write_text("".join("\t".join(line) + "\n" for line in lines), encoding="utf-8")
 
 
 def effect(key: Key, cases: int, found: Mapping[str, Again]) -> Effect:

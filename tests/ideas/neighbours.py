@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import astuple, dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from tests.ideas.effects import TOLERANCE, Again, effect
 from tests.ideas.literals import Key
+from tests.ideas.rows import NumberRow
 
 TABLE = Path(__file__).parent / "neighbours.tsv"
 WORSE = "half and double beside it: one at least is worse, none better (neighbours.tsv)"
@@ -15,13 +16,11 @@ NOTHING = "half and double beside it decide nothing (neighbours.tsv)"
 
 
 @dataclass(frozen=True)
-class Neighbours:
+class Neighbours(NumberRow):
     """What half and twice a number do.
 
     Attributes
     ----------
-    file, name, value : str
-        The number (`Key`).
     cases : int
         Frozen cases that were answered again.
     held, half_held, double_held : int
@@ -30,9 +29,6 @@ class Neighbours:
         Sum of interval scores over the sum with the number as it is.
     """
 
-    file: str
-    name: str
-    value: str
     cases: int
     held: int
     half_held: int
@@ -41,34 +37,12 @@ class Neighbours:
     double_score: float
 
     @property
-    def key(self) -> Key:
-        """The number."""
-        return Key(self.file, self.name, self.value)
-
-    @property
     def source(self) -> str:
         """What the scores say for the number; empty where no truth is known, or one is better."""
         scores = (self.half_score, self.double_score)
         if not self.held or min(scores) < 1.0 - TOLERANCE:
             return ""
         return WORSE if max(scores) > 1.0 + TOLERANCE else NOTHING
-
-
-def read(table: Path = TABLE) -> dict[Key, Neighbours]:
-    """Return the rows of the table; none where there is no table."""
-    if not table.is_file():
-        return {}
-    kinds = [{"int": int, "float": float}.get(str(one.type), str) for one in fields(Neighbours)]
-    rows = (line.split("\t") for line in table.read_text(encoding="utf-8").splitlines()[1:])
-    found = (Neighbours(*(kind(c) for kind, c in zip(kinds, row, strict=True))) for row in rows)
-    return {one.key: one for one in found}
-
-
-def write(rows: Iterable[Neighbours], table: Path = TABLE) -> None:
-    """Write the table, sorted by number."""
-    head = [one.name for one in fields(Neighbours)]
-    lines = [head, *(map(str, astuple(row)) for row in sorted(rows, key=lambda row: row.key))]
-    table.write_text("".join("\t".join(line) + "\n" for line in lines), encoding="utf-8")
 
 
 def neighbours(key: Key, half: Mapping[str, Again], double: Mapping[str, Again]) -> Neighbours:

@@ -18,9 +18,10 @@ from studies.switch_off.apart import apart
 from tests.ideas import neighbours
 from tests.ideas.changed import changed_answers, movers
 from tests.ideas.drawn import ALL_CASES
-from tests.ideas.effects import TABLE, effect, read, write
+from tests.ideas.effects import TABLE, Effect, effect
 from tests.ideas.literals import Key
 from tests.ideas.number_users import users
+from tests.ideas.rows import read_rows, write_rows
 from tests.ideas.sources import ROOT, Module
 
 PACKAGE = str(ROOT / "host" / "src" / "host")
@@ -39,13 +40,13 @@ def measure(keys: Sequence[Key], known: Mapping[str, Module], table: Path = TABL
     """Add a row for every number that has none; rows whose number is gone leave."""
     for name in PRELOADED:
         importlib.import_module(name)
-    rows = {key: row for key, row in read(table).items() if key in set(keys)}
+    rows = {key: row for key, row in read_rows(Effect, table).items() if key in set(keys)}
     cases = _cases(keys, known)
     for key in keys:
         if key not in rows:
             names = [name for name in cases[key] if name in FIRST]
             rows[key] = effect(key, len(names), changed_answers([key], names))
-            write(rows.values(), table)
+            write_rows(Effect, rows.values(), table)
             print(rows[key], flush=True)
     silent = [k for k in keys if not rows[k].moved and rows[k].cases < len(cases[k])]
     for start in range(0, len(silent), TOGETHER):
@@ -53,21 +54,22 @@ def measure(keys: Sequence[Key], known: Mapping[str, Module], table: Path = TABL
         others = {name for key in group for name in cases[key]} - set(FIRST)
         rows |= {key: effect(key, len(cases[key]), {}) for key in group}
         rows |= {key: effect(key, len(cases[key]), found) for key, found in movers(group, others)}
-        write(rows.values(), table)
+        write_rows(Effect, rows.values(), table)
 
 
 def measure_neighbours(keys: Sequence[Key], known: Mapping[str, Module]) -> None:
     """Halve and double every number that moves an answer, and add a row; old rows stay."""
     for name in PRELOADED:
         importlib.import_module(name)
-    effects, rows = read(), neighbours.read()
+    effects = read_rows(Effect, TABLE)
+    rows = read_rows(neighbours.Neighbours, neighbours.TABLE)
     moving = [key for key in keys if key not in rows and (key not in effects or effects[key].moved)]
     for key, cases in _cases(moving, known).items():
         most = effects[key].where.partition(":")[0] if key in effects else ""
         names = [name for name in cases if name in (*FIRST, most)]
         half, double = (changed_answers([key], names, by) for by in (0.5, 2.0))
         rows[key] = neighbours.neighbours(key, half, double)
-        neighbours.write(rows.values())
+        write_rows(neighbours.Neighbours, rows.values(), neighbours.TABLE)
         print(rows[key], flush=True)
 
 

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.ideas.effects import Effect, effect, read, write
+from tests.ideas.effects import Effect, effect
 from tests.ideas.literals import Key
 from tests.ideas.number_users import users
+from tests.ideas.rows import read_rows, write_rows
 from tests.ideas.sources import modules
 
 OWN = """from b import SHARED
@@ -48,9 +49,9 @@ def test_rows_are_read_as_they_were_written(tmp_path: Path) -> None:
         Effect("b", "f", "3", 16, 2, 0.25, "stuck: M_q 1 -> 2", 130, 129, 1.002),
         Effect("a.toml", "x.y", "0.1", 4, 0, 0.0, "", 0, 0, 1.0),
     ]
-    write(rows, tmp_path / "effects.tsv")
-    assert read(tmp_path / "effects.tsv") == {row.key: row for row in rows}
-    assert next(iter(read(tmp_path / "effects.tsv"))) == Key("a.toml", "x.y", "0.1")
+    write_rows(Effect, rows, tmp_path / "effects.tsv")
+    assert read_rows(Effect, tmp_path / "effects.tsv") == {row.key: row for row in rows}
+    assert next(iter(read_rows(Effect, tmp_path / "effects.tsv"))) == Key("a.toml", "x.y", "0.1")
 
 
 def record(value: float, half: float, off: float) -> dict[str, object]:

@@ -9,7 +9,8 @@ import pytest
 
 from tests.ideas.classes import read as read_classes
 from tests.ideas.literals import Key
-from tests.ideas.neighbours import NOTHING, WORSE, Neighbours, neighbours, read, write
+from tests.ideas.neighbours import NOTHING, TABLE, WORSE, Neighbours, neighbours
+from tests.ideas.rows import read_rows, write_rows
 from tests.ideas.test_effects import record
 
 
@@ -35,12 +36,12 @@ def test_a_row_is_made_of_what_both_do_and_read_as_written(tmp_path: Path) -> No
     made = neighbours(Key("a", "f", "3"), half, double)
     assert (made.cases, made.held, made.half_held, made.double_held) == (1, 1, 1, 0)
     assert (made.half_score, made.double_score) == pytest.approx((1.2, 3.0))
-    write([made], tmp_path / "neighbours.tsv")
-    assert read(tmp_path / "neighbours.tsv") == {made.key: made}
+    write_rows(Neighbours, [made], tmp_path / "neighbours.tsv")
+    assert read_rows(Neighbours, tmp_path / "neighbours.tsv") == {made.key: made}
 
 
 def test_a_source_that_names_neighbours_says_what_their_row_says() -> None:
-    rows = read()
+    rows = read_rows(Neighbours, TABLE)
     for key, known in read_classes().items():
         if known.source in (WORSE, NOTHING):
             assert rows[key].source == known.source, key
