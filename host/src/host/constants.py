@@ -26,7 +26,7 @@ ENTANGLED = 0.9  # correlation of two estimates: what is wrong of one is wrong o
 # Residuals and paths are judged in means over this long: of quicker samples an AR model of low
 # order cannot separate slow gusts from white noise, and a trainer moves far below 10 Hz.
 BLOCK_S = 0.05
-DRIFT_POWERS = 4  # of time, constant to cubic: drift and trend, with which no gust correlates
+DRIFT_POWERS = 4  # of time, constant to cubic: they take up drift, gusts do not look like them
 STEEPEST_SINE = 0.5  # of a path; a steeper one is an error of the velocity down
 # 95 % half-width over an estimate, or over what would contribute 5 % of its row: up to the first it
 # is trusted, up to the second used with care. Everything that judges a width reads these two.

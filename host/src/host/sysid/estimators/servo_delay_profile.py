@@ -18,8 +18,8 @@ from host.sysid.numerics.input_coherence import block_length, block_means
 
 LEAST, MOST = (-0.15, 0.3, 0.2), (0.5, 60.0, 60.0)  # a delay, a bandwidth, a rate that can be
 SCAN_S = np.arange(-0.08, 0.241, 0.04)
-# Means over this long have the noise of output error; and what a model lacks at any frequency,
-# over the motion: whitened, calm air's small errors of the model would tell the delay.
+# Noise of output error is fitted to means over the first, in s. The second is what a model lacks
+# at any frequency, over the motion: else small errors of a model in calm air tell the delay.
 AR_STEP_S, LACK = 0.02, 0.02
 # The third argument is a fit behind servos not far from these, to start from, or None.
 Fit = Callable[[LinearModel, Sequence[Maneuver], FitResult | None], FitResult]

@@ -331,7 +331,7 @@ def block_means(values: Array, block: int, seen: BoolArray | None = None) -> Arr
     return np.asarray((blocks * weight).sum(axis=1) / np.maximum(weight.sum(axis=1), 1))
 
 
-LONGEST_S = 3.2
+LONGEST_S = 3.2  # last of the lags
 # A share of the shortest record: a longer memory is not seen often enough (Box & Jenkins, Time
 # Series Analysis, 1970).
 LAG_SHARE = 0.25

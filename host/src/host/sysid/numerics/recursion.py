@@ -79,11 +79,11 @@ def propagate(
     # The input of the recursion is computed block by block and stays in the cache.
     forcing = np.empty((min(BLOCK, samples), n * free))
     S, T = start_sensitivities.copy(), np.empty_like(start_sensitivities)
-    for begin in range(0, samples, BLOCK):
-        count = min(BLOCK, samples - begin)
-        with np.errstate(over="ignore", invalid="ignore"):  # a model that diverges is told so
+    with np.errstate(over="ignore", invalid="ignore"):  # of a model that diverges
+        for begin in range(0, samples, BLOCK):
+            count = min(BLOCK, samples - begin)
             np.dot(z[begin : begin + count], flat, out=forcing[:count])
-        propagate_block(F, C, S, T, forcing, begin, count, out)
+            propagate_block(F, C, S, T, forcing, begin, count, out)
 
 
 @compiled

@@ -29,7 +29,7 @@ from host.sysid.numerics.score_variance import variance_ratio
 from host.sysid.numerics.simulator import Response
 from host.sysid.validation.free_simulation import FreeResponses, weighted_fit
 
-DRAWS, DRAW_SEED = 100, 2  # 50 to 200 are enough: Efron & Tibshirani, An Introduction, sec. 6.4
+DRAWS, DRAW_SEED = 100, 2
 
 
 def excess_over_noise_model(
