@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import argparse
 import csv
+import functools
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from host.arrays import Array
@@ -24,6 +24,7 @@ from studies.field_records.true_derivatives import NAMES, WIDTH, forces, true_de
 from studies.field_records.worn_aeroplane import Worn
 from studies.foreign.flight import INPUTS, SPEED_MPS
 from studies.judgement.field_flights import DRAW
+from studies.stored_rows import rows_file
 
 RADPS = 2.0 * np.pi * np.arange(0.05, 8.0, 0.05)
 COLUMNS = ("alpha", "q", "de")
@@ -74,19 +75,31 @@ def _elevator_spectrum() -> Array:
     return np.sqrt(power)
 
 
+@functools.lru_cache(maxsize=1)
+def _best_over_true(seed: int) -> dict[str, float]:
+    """Return the best moments of the aircraft of a flight over the truth of the table."""
+    rng = np.random.default_rng([DRAW, seed])
+    a = drawn_aircraft(rng, draw(rng))
+    true = true_derivatives(a, SPEED_MPS, a.trim_alpha, a.trim_de)
+    return {name: best / true[name] for name, best in best_moments(a).items()}
+
+
 def main() -> None:
     """Print, over the flights of a file of rows, what holds by either truth."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rows", type=Path, required=True, help="of studies.judgement")
-    with parser.parse_args().rows.open(encoding="utf-8", newline="") as file:
+    parser.add_argument("--rows", type=rows_file, required=True, help="of studies.judgement")
+    path = parser.parse_args().rows
+    if not path.is_file():
+        parser.error(f"{path} is no file; `python -m studies.judgement --rows {path}` writes it")
+    with path.open(encoding="utf-8", newline="") as file:
         rows = [r for r in csv.DictReader(file) if r["world"] == WORLD and r["name"] in MOMENTS]
+    if not rows:
+        parser.error(f"{path} has no flight of the world {WORLD!r}")
     ratio: dict[str, list[float]] = {name: [] for name in MOMENTS}
     held = {name: np.zeros(3, dtype=int) for name in MOMENTS}
     for row in rows:
-        rng = np.random.default_rng([DRAW, int(row["seed"])])
-        a = drawn_aircraft(rng, draw(rng))
         name = row["name"]
-        part = best_moments(a)[name] / true_derivatives(a, SPEED_MPS, a.trim_alpha, a.trim_de)[name]
+        part = _best_over_true(int(row["seed"]))[name]
         ratio[name].append(part)
         if row["half_width"]:
             true, value, half = (float(row[k]) for k in ("true", "estimate", "half_width"))
