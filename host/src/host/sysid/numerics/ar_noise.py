@@ -177,7 +177,7 @@ def lagged_moments(
     ----------
     residuals : sequence of Array, shape (samples,)
         One output in each maneuver.
-    taken : sequence of Array, shape (samples, P)
+    parameter_parts : sequence of Array, shape (samples, P)
         J L with sensitivities J and L L' the covariance of the parameters.
     order : int
         Highest lag.
