@@ -280,7 +280,7 @@ def test_local_derivatives_explain_the_flown_moment() -> None:
 
 def test_thesis_rows_have_its_faults() -> None:
     card = cards.load("thesis_flight2")
-    record = fly(card, seed=1)
+    record = fly(card, seed=4)
     printed = original_logger.rows(record, air_data(record))
     assert np.diff(printed["t_s"]).mean() == pytest.approx(0.05, rel=0.02)
     # Each half of an IMU sample comes every other row.

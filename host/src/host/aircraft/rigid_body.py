@@ -177,6 +177,19 @@ def rotate_to_ned(x: Array, a: float, b: float, c: float) -> tuple[float, float,
 
 
 @compiled_fast
+def gust_in_body(x: Array, gust: Array) -> tuple[float, float, float]:
+    """Turn a gust along the track, to its right and down to body axes.
+
+    Turbulence stays with the ground (MIL-F-8785C 3.7.1): an aircraft that yaws or pitches does not
+    take it along.
+    """
+    north, east, _ = rotate_to_ned(x, x[U], x[V], x[W])
+    track = math.atan2(east, north)
+    c, s = math.cos(track), math.sin(track)
+    return rotate_to_body(x, c * gust[0] - s * gust[1], s * gust[0] + c * gust[1], gust[2])
+
+
+@compiled_fast
 def derivative(
     frame: Airframe, x: Array, command: Array, air: Array, density_kgpm3: float, out: Array
 ) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from host.aircraft.air import Atmosphere, Turbulence, density_kgpm3, gust_step
 from host.aircraft.airframe import DOWN, STATE_COUNT, Airframe, Array, P
-from host.aircraft.rigid_body import rotate_to_body, step
+from host.aircraft.rigid_body import gust_in_body, rotate_to_body, step
 from host.compiled import compiled_fast
 from host.twin.flight.pilot import Orders
 from host.twin.flight.stick_commands import (
@@ -53,7 +53,7 @@ def fly_steps(
     `stick_commands`, the rest as in `FlightRecord`.
     """
     work = np.empty((5, STATE_COUNT + 4))
-    now = np.zeros(9)
+    now, gust = np.zeros(9), np.zeros(6)
     limit_rad = frame.surface_limit_rad
     for i in range(first, last):
         if i == hands.ground_steps:
@@ -69,7 +69,9 @@ def fly_steps(
         ua, va, wa = x[0] - wu - now[3], x[1] - wv - now[4], x[2] - ww - now[5]
         speed = math.sqrt(ua * ua + va * va + wa * wa)
         if turbulence.sigma_w_mps > 0.0 and flying:
-            gust_step(turbulence, z, noise[i], speed, frame.span_m, step_s, now[3:])
+            gust_step(turbulence, z, noise[i], speed, frame.span_m, step_s, gust)
+            now[3], now[4], now[5] = gust_in_body(x, gust)
+            now[6:] = gust[3:]
 
         row = i // hands.period_steps
         if i % hands.period_steps == 0:  # a new receiver frame
