@@ -47,8 +47,6 @@ class FlownCondition:
     ----------
     surfaces_rad : tuple of float
         Elevator, aileron, rudder.
-    climb_rad : float
-        Angle of the path through the air.
     """
 
     airspeed_mps: float
@@ -57,7 +55,6 @@ class FlownCondition:
     surfaces_rad: tuple[float, float, float]
     thrust_n: float
     density_kgpm3: float
-    climb_rad: float = 0.0
 
 
 def flown_derivatives(
@@ -100,7 +97,7 @@ def flown_derivatives(
 def flown_modes(
     derivatives: dict[str, float], at: FlownCondition, gravity_mps2: float
 ) -> list[Mode]:
-    """Return the modes of motion about the condition, as `linearisation.modes` names them.
+    """Return the modes about level flight at the condition, as `linearisation.modes` names them.
 
     Parameters
     ----------
@@ -109,13 +106,11 @@ def flown_modes(
     at : FlownCondition
     gravity_mps2 : float
     """
-    d, speed, climb = derivatives, at.airspeed_mps, at.climb_rad
-    along, across = gravity_mps2 * math.cos(climb), gravity_mps2 * math.sin(climb)
-    pitch = at.alpha_rad + climb
+    d, gravity = derivatives, gravity_mps2
     longitudinal = np.array(
         [
-            [d["D_V"], d["D_alpha"] + along, d["D_q"], -along],
-            [d["Z_V"], d["Z_alpha"] + across / speed, 1.0 + d["Z_q"], -across / speed],
+            [d["D_V"], d["D_alpha"] + gravity, d["D_q"], -gravity],
+            [d["Z_V"], d["Z_alpha"], 1.0 + d["Z_q"], 0.0],
             [d["M_V"], d["M_alpha"], d["M_q"], 0.0],
             [0.0, 0.0, 1.0, 0.0],
         ]
@@ -126,11 +121,11 @@ def flown_modes(
                 d["Y_beta"],
                 d["Y_p"] + math.sin(at.alpha_rad),
                 d["Y_r"] - math.cos(at.alpha_rad),
-                gravity_mps2 * math.cos(pitch) / speed,
+                gravity * math.cos(at.alpha_rad) / at.airspeed_mps,
             ],
             [d["L_beta"], d["L_p"], d["L_r"], 0.0],
             [d["N_beta"], d["N_p"], d["N_r"], 0.0],
-            [0.0, 1.0, math.tan(pitch), 0.0],
+            [0.0, 1.0, math.tan(at.alpha_rad), 0.0],
         ]
     )
     return modes(Linear(longitudinal, np.zeros((4, 1)), lateral, np.zeros((4, 2))))
@@ -144,7 +139,7 @@ def _forces(frame: Airframe, point: Array, at: FlownCondition, throttle: float) 
         [math.cos(alpha) * math.cos(beta), math.sin(beta), math.sin(alpha) * math.cos(beta)]
     )
     x[P : R + 1] = point[3:6]
-    x[Q0 : Q0 + 4] = quaternion(0.0, alpha + at.climb_rad, 0.0)
+    x[Q0 : Q0 + 4] = quaternion(0.0, alpha, 0.0)
     x[ELEVATOR : ELEVATOR + 3] = point[6:9]
     x[ROTOR] = _rotor_radps(frame, throttle, float(x[U]), float(x[W]), at.density_kgpm3)
     out = np.empty(STATE_COUNT + 4)

@@ -344,6 +344,15 @@ def retrimmed(model: LinearModel, trim: Trim) -> LinearModel:
     return penetration_of(bent, model)
 
 
+def in_level_flight(model: LinearModel, trim: Trim) -> LinearModel:
+    """Return a template's model about level flight at its angle of attack; others as they are.
+
+    A mean climb, or a pitch angle that is off, damps the phugoid and moves the spiral.
+    """
+    level = replace(trim, theta_rad=trim.alpha_rad)
+    return retrimmed(model, level) if is_template(model, trim) else model
+
+
 def scaled_by_airspeed(model: LinearModel, trim: Trim) -> set[str]:
     """Return the parameters of a template that are forces over airspeed."""
     faster = replace(trim, airspeed_mps=2.0 * trim.airspeed_mps)

@@ -13,6 +13,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.sysid.aerodynamics.coefficient_table import coefficients
+from host.sysid.errors.systematic_errors import in_level_flight
 from host.sysid.errors.widest_errors import widest_errors
 from host.sysid.estimators.filter_error_gust import gust_parameters
 from host.sysid.estimators.gust_penetration import without_gust_penetration
@@ -116,7 +117,7 @@ class LinearEstimator:
             validation=validation.held_out,
             identifiability_flags=assess_identifiability(result, found.maneuvers).flags,
             collinearity=collinearity(statistical, gusts),
-            modes=modes(result),
+            modes=modes(result, in_level_flight(model, chosen.trim)),
             coefficients=() if intervals.parts is None else coefficients(intervals.parts),
             coefficient_parts=intervals.parts,
             errors=intervals.errors,

@@ -53,13 +53,19 @@ class Mode:
         return abs(self.eigenvalue.imag) > REAL_LIMIT * abs(self.eigenvalue)
 
 
-def modes(result: FitResult) -> tuple[Mode, ...]:
-    """Return the modes of a fitted model, fastest first, with first-order uncertainty."""
-    model = result.model
-    A = result.matrices()[0]
+def modes(result: FitResult, model: LinearModel | None = None) -> tuple[Mode, ...]:
+    """Return the modes of a fitted model, fastest first, with first-order uncertainty.
+
+    Parameters
+    ----------
+    result : FitResult
+    model : LinearModel, optional
+        With the same parameters about another condition.
+    """
+    model = model or result.model
     count = len(model.parameters)
-    covariance = result.covariance[:count, :count]
-    return modes_of(model, A, covariance)
+    A = model.matrices(result.estimate[:count])[0]
+    return modes_of(model, A, result.covariance[:count, :count])
 
 
 def modes_of(model: LinearModel, A: Array, covariance: Array) -> tuple[Mode, ...]:

@@ -105,7 +105,6 @@ def _maneuver(
         surfaces_rad=(float(at[5]), float(at[6]), float(at[7])),
         thrust_n=float(record.thrust_n[inside].mean()),
         density_kgpm3=float(data.density_kgpm3[inside].mean()),
-        climb_rad=float(theta.mean() - at[0]),
     )
     dimensional = flown_derivatives(frame, flown, spread)
     return {
@@ -124,7 +123,7 @@ def _maneuver(
             "alpha_spread_rad": spread,
             "elevator_rad": flown.surfaces_rad[0],
             "thrust_n": flown.thrust_n,
-            "climb_rad": flown.climb_rad,
+            "climb_rad": float(theta.mean() - at[0]),
         },
         "derivatives": (
             linear_aircraft_derivatives(frame, record.trim)
@@ -139,7 +138,7 @@ def _maneuver(
 def _modes(
     record: FlightRecord, dimensional: dict[str, float], flown: FlownCondition
 ) -> dict[str, object]:
-    """Return frequency (rad/s) and damping of each mode, where the maneuver was flown."""
+    """Return frequency (rad/s) and damping of each mode, in level flight as the maneuver was."""
     frame = record.frame
     found = (
         modes(linearise(frame, record.trim))
