@@ -19,7 +19,6 @@ TEXT = calibration(load(NAME))
 # Lines of a calibration, the number in them, and a coefficient whose interval it rules.
 LINES = {
     "alpha": (("alpha_a", "alpha_b"), "slope_sigma", "CL_alpha"),
-    "beta": (("beta_a", "beta_b"), "slope_sigma", "Cn_beta"),
     "pitot": (("dp_a", "dp_b"), "slope_sigma", "CL_alpha"),
     "pitot zero": (("dp_a", "dp_b"), "zero_sigma", "CL_alpha"),
     "elevator": (("pot_elevator",), "slope_sigma", "Cm_de"),
@@ -79,6 +78,16 @@ def test_a_line_or_table_of_a_calibration_widens_an_interval(
     tables, key, coefficient = GROUPS[group]
     wide = halves(columns, tmp_path / "mine.toml", scaled(TEXT, tables, key, 10.0))
     assert wide[coefficient] > 1.05 * usual[coefficient]
+
+
+def test_a_flight_tells_the_scale_of_its_own_sideslip_vane(
+    columns: dict[str, Array], usual: dict[str, float], tmp_path: Path
+) -> None:
+    """By yaw rate and side force: a line ten times worse widens nothing by 2 %."""
+    text = scaled(TEXT, ("beta_a", "beta_b"), "slope_sigma", 10.0)
+    assert text != TEXT
+    wide = halves(columns, tmp_path / "mine.toml", text)
+    assert wide["Cn_beta"] == pytest.approx(usual["Cn_beta"], rel=0.02)
 
 
 def test_better_lines_of_a_calibration_narrow_intervals(

@@ -63,8 +63,8 @@ def solved(
     spectra: dict[EquationKey, Spectrum],
     slopes: dict[EquationKey, Spectrum],
 ) -> FinalStep:
-    unknowns = Unknowns({"Cm": np.arange(2)}, 2, 0, 1)
-    side = EquationSpectra(spectra, {}, slopes)
+    unknowns = Unknowns({"Cm": np.arange(2)}, 2, 1)
+    side = EquationSpectra(spectra, slopes)
     parts = equation_blocks(blocks, side, side, {"Cm": np.zeros(2)}, unknowns, NOISE)
     known = Prior(np.diag([0.0, 0.0, SD**-2]), np.zeros(3))
     position = {"Cm_alpha": 0, "Cm_q": 1}

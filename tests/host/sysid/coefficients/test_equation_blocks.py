@@ -23,7 +23,7 @@ from host.sysid.coefficients.window_spectra import (
 from host.sysid.reconstruction import Spectrum
 
 POSITIONS = {"Cm": np.array([0, 1]), "w": np.zeros(0, dtype=np.int64)}
-TERMS, GUSTS, ERRORS = 2, 3, 4  # gusts of one window
+TERMS, ERRORS = 2, 4
 NOISE = {"Cm": (np.array([0.1, 4.5]), np.array([0.5, 2.0]))}
 POSITION = {"Cm_alpha": 0, "Cm_q": 1}
 
@@ -31,7 +31,7 @@ POSITION = {"Cm_alpha": 0, "Cm_q": 1}
 def random_blocks(
     windows: int, seed: int = 3
 ) -> tuple[list[WindowTransform], Unknowns, list[EquationBlock]]:
-    """Two equations in every window, one of them with slow gusts; numbers are noise."""
+    """Two equations in every window, one of them without terms; numbers are noise."""
     random = np.random.default_rng(seed)
 
     def noise(*shape: int) -> Spectrum:
@@ -47,20 +47,17 @@ def random_blocks(
     sides = []
     for _ in range(2):
         spectra: dict[EquationKey, Spectrum] = {}
-        gusts: dict[EquationKey, Spectrum] = {}
         slopes: dict[EquationKey, Spectrum] = {}
         for k, block in enumerate(blocks):
             F = len(block.frequency_hz)
             spectra["Cm", k], spectra["w", k] = noise(F, 1 + TERMS), noise(F, 1)
-            gusts["w", k] = noise(F, GUSTS)
             slopes["Cm", k], slopes["w", k] = noise(F, ERRORS), noise(F, ERRORS)
-        sides.append(EquationSpectra(spectra, gusts, slopes))
+        sides.append(EquationSpectra(spectra, slopes))
     # Instrumental variables are like slopes but not the same.
     noise_free = EquationSpectra(*({k: 0.5 * v + a[k] for k, v in b.items()}
                   for a, b in ((sides[0].spectra, sides[1].spectra),
-                               (sides[0].gusts, sides[1].gusts),
                                (sides[0].slopes, sides[1].slopes))))  # fmt: skip
-    unknowns = Unknowns(POSITIONS, TERMS, windows * GUSTS, ERRORS)
+    unknowns = Unknowns(POSITIONS, TERMS, ERRORS)
     own = {"Cm": np.array([0.3, -0.2]), "w": np.zeros(0)}
     return blocks, unknowns, equation_blocks(blocks, sides[0], noise_free, own, unknowns, NOISE)
 
@@ -76,7 +73,7 @@ def test_trend_of_a_block_moves_nothing() -> None:
 
 def test_memory_grows_with_the_flight_and_not_with_its_square() -> None:
     peaks = []
-    for windows in (20, 80):
+    for windows in (40, 160):
         tracemalloc.start()
         _, unknowns, parts = random_blocks(windows)
         accumulate(parts, unknowns.count)

@@ -169,7 +169,7 @@ def intervals(search: SearchResult) -> CoefficientIntervals:
     """Apply the geometric prior, add drag at zero lift, test the agreement of the maneuvers."""
     problem, final, level_slopes = search.problem, search.final, search.level_slopes
     data, position = search.data, problem.position
-    state = np.concatenate([search.theta, np.zeros(final.unknowns.gusts), search.errors])
+    state = np.concatenate([search.theta, search.errors])
     state, covariance, gain_complement, arm_shifts = apply_geometry_prior(
         state,
         search.covariance,
@@ -185,7 +185,7 @@ def intervals(search: SearchResult) -> CoefficientIntervals:
             problem.model, state, position, means, regressor_means, found
         )
     values = {name: value for name, (value, _) in found.items()}
-    errors = slice(final.unknowns.first_error, None)
+    errors = slice(final.unknowns.coefficients, None)
     jacobian = np.vstack([*(slope for _, slope in found.values()), np.eye(len(state))[errors]])
     joint = jacobian @ covariance @ jacobian.T
     agreement = scatter_test(

@@ -18,7 +18,7 @@ from host.constants import GRAVITY_MPS2
 from host.instrument.deviations import SensorErrorModel
 from host.instrument.error_sources import ErrorSource
 from host.sysid.coefficients.aero_equations import KINEMATIC, Equation, FlightHistory, equations
-from host.sysid.coefficients.slow_gusts import LENGTH_M
+from host.sysid.coefficients.vertical_gust import LENGTH_M
 from host.sysid.coefficients.window_spectra import (
     EquationKey,
     Window,
@@ -134,7 +134,7 @@ class FlightProblem:
             Standard deviation of the vertical gust, whose mean over the flight is not zero.
         """
         V = self.condition[0]
-        lengths = V * self.record.samples * self.record.dt_s / LENGTH_M["w"]
+        lengths = V * self.record.samples * self.record.dt_s / LENGTH_M
         return float(GRAVITY_MPS2 * gust_mps / V / np.sqrt(lengths))
 
     def evaluate(

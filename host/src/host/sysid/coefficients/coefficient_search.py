@@ -48,13 +48,13 @@ from host.sysid.coefficients.equation_blocks import (
 )
 from host.sysid.coefficients.flight_terms import SIDE
 from host.sysid.coefficients.normal_equations import Prior, solve_normal_equations
-from host.sysid.coefficients.slow_gusts import gust_information, gust_regressors, gust_strength
 from host.sysid.coefficients.trim_derivatives import DerivativesAtTrim
+from host.sysid.coefficients.vertical_gust import vertical_gust_mps
 from host.sysid.coefficients.window_spectra import ResidualSpectra, Window, residual_spectra
 from host.sysid.models.coefficient_model import CoefficientModel, standard_model
 from host.sysid.reconstruction.inverse_sensor_model import decimate, usable_length
 
-# Rounds with the coefficients alone, then with sensor errors and slow gusts.
+# Rounds with the coefficients alone, then with sensor errors.
 COEFFICIENT_ROUNDS, JOINT_ROUNDS = 3, 2
 FIXED = 1e30  # inverse variance of what is not estimated, or not yet
 COLUMNS = (
@@ -178,8 +178,7 @@ def _search(problem: FlightProblem, known_noise: ResidualSpectra) -> SearchResul
     by_round: list[Array] = []
     for round_ in range(COEFFICIENT_ROUNDS + JOINT_ROUNDS):
         data, spectra = _linearise(problem, iterate, round_)
-        gusts = sum(values.shape[1] for values in spectra[0].gusts.values())
-        unknowns = Unknowns(problem.positions, len(position), gusts, len(sd))
+        unknowns = Unknowns(problem.positions, len(position), len(sd))
         blocks = equation_blocks(
             problem.windows, *spectra, iterate.coefficients(problem), unknowns, iterate.noise
         )
@@ -191,13 +190,13 @@ def _search(problem: FlightProblem, known_noise: ResidualSpectra) -> SearchResul
             accumulate(blocks, unknowns.count),
             _prior(problem, data, unknowns, iterate, inverse_variance),
             position,
-            unknowns.first_error + considered,
+            unknowns.coefficients + considered,
             sd[considered],
         )
         final = FinalStep(blocks, solution, unknowns, iterate.noise, data.spectra)
         iterate.theta = iterate.theta + solution.step[: unknowns.coefficients]
         by_round.append(iterate.theta)
-        iterate.errors = iterate.errors + solution.step[unknowns.first_error :]
+        iterate.errors = iterate.errors + solution.step[unknowns.coefficients :]
         residuals = (
             ((block.equation, block.window), block.residual_after(solution.step))
             for block in blocks
@@ -208,7 +207,7 @@ def _search(problem: FlightProblem, known_noise: ResidualSpectra) -> SearchResul
     # Each error is held to be zero with its deviation: what it truly is pulls by its prior alone,
     # whatever noise the data have.
     prior_weight = np.divide(inverse_variance, 1.0 / sd, out=np.zeros_like(sd), where=sd > 0.0)
-    shifts = -final.solution.inverse[:, final.unknowns.first_error :] * prior_weight
+    shifts = -final.solution.inverse[:, final.unknowns.coefficients :] * prior_weight
     moved = by_round[COEFFICIENT_ROUNDS - 1] - by_round[0]  # both without sensor errors
     if known_noise:
         moved = np.zeros_like(moved)
@@ -254,9 +253,7 @@ def _linearise(
 def _spectra(
     problem: FlightProblem, data: EquationData, slopes: SensorErrorSlopes
 ) -> EquationSpectra:
-    """Return the spectra of the equations; slow gusts are estimated with the sensor errors."""
-    gusts = gust_regressors(data.signals, problem.windows) if slopes else {}
-    return EquationSpectra(data.spectra, gusts, slopes)
+    return EquationSpectra(data.spectra, slopes)
 
 
 def _whole_axes(model: CoefficientModel) -> tuple[bool, bool]:
@@ -277,17 +274,16 @@ def _prior(
     iterate: _Iterate,
     inverse_variance: Array,
 ) -> Prior:
-    """Return the prior of sensor errors, slow gusts and the tangential balance of the flight."""
+    """Return the prior of sensor errors and of the tangential balance of the flight."""
     information, gradient = np.zeros((unknowns.count,) * 2), np.zeros(unknowns.count)
-    first = unknowns.first_error
+    first = unknowns.coefficients
     information[first:, first:] = np.diag(inverse_variance)
     gradient[first:] = -inverse_variance * iterate.errors
-    if unknowns.gusts:
-        V, dt_s = problem.condition[0], problem.record.dt_s
-        strength = gust_strength(iterate.noise, V, dt_s)
-        gusts = slice(unknowns.coefficients, first)
-        information[gusts, gusts] = gust_information(problem.windows, strength, V, dt_s)
-        deviation_mps2 = problem.balance_deviation_mps2(strength["w"])
+    # Without elevator maneuvers the side equation stands for the vertical one.
+    rate = iterate.noise.get("w", iterate.noise.get("v"))
+    if iterate.slopes[0] and rate is not None:
+        gust_mps = vertical_gust_mps(rate[1], problem.condition[0], problem.record.dt_s)
+        deviation_mps2 = problem.balance_deviation_mps2(gust_mps)
         balance = iterate.level_slopes[0] / deviation_mps2
         information[first:, first:] += np.outer(balance, balance)
         gradient[first:] -= balance * (mean_levels(problem, data)[0] / deviation_mps2)

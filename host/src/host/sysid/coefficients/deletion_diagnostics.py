@@ -127,12 +127,9 @@ def _sums_of_squares(
     trends = window.trends[:, :AERO_TREND]
     response = final.spectra[block.equation, block.window][:, 0]
     trend = np.concatenate([trends.real, trends.imag])
-    gusts = final.unknowns.coefficients + np.arange(final.unknowns.gusts)
-    shared_columns = ~np.isin(block.unknown_indices, gusts)  # a slow gust is the maneuver's own
-    A, indices = block.A[:, shared_columns], block.unknown_indices[shared_columns]
     found = []
     for values in (
-        *((block.y - A @ step[indices]) / weight for step in steps),
+        *((block.y - block.A @ step[block.unknown_indices]) / weight for step in steps),
         np.concatenate([response.real, response.imag]),
     ):
         fitted_trend = trend @ np.linalg.lstsq(trend, values, rcond=ROUNDING_SHARE)[0]

@@ -1,7 +1,7 @@
 """One equation in one window: its regressors over the unknowns that enter it; normal equations.
 
-Forty maneuvers have two hundred blocks and three hundred unknowns; one block contains sixty of
-them: its terms, its slow gusts, the sensor errors. The normal equations are sums over blocks, so
+Forty maneuvers have two hundred blocks and three hundred unknowns; one block contains fifty of
+them: its terms, the sensor errors. The normal equations are sums over blocks, so
 the matrix with a line for every frequency of a flight is never formed. Each block has a constant
 and a slope in time of its own, which are projected out: the same result as estimating them.
 """
@@ -26,30 +26,24 @@ from host.sysid.reconstruction.inverse_sensor_model import Spectrum
 
 @dataclass(frozen=True, slots=True)
 class Unknowns:
-    """The vector of unknowns: coefficients of every equation, slow gusts, sensor errors.
+    """The vector of unknowns: coefficients of every equation, then sensor errors.
 
     Attributes
     ----------
     positions : mapping
         Equation to the indices of its coefficients.
-    coefficients, gusts, errors : int
+    coefficients, errors : int
         Number of each kind, in this order in the vector.
     """
 
     positions: Mapping[str, IntArray]
     coefficients: int
-    gusts: int
     errors: int
 
     @property
     def count(self) -> int:
         """Number of all unknowns."""
-        return self.first_error + self.errors
-
-    @property
-    def first_error(self) -> int:
-        """Index of the first sensor error."""
-        return self.coefficients + self.gusts
+        return self.coefficients + self.errors
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,14 +54,11 @@ class EquationSpectra:
     ----------
     spectra : mapping
         Response in column 0, regressors behind it.
-    gusts : mapping
-        Regressors of the slow gusts; empty as long as they are not estimated.
     slopes : mapping
         Derivative of the residual by each sensor error; empty as long as they are not estimated.
     """
 
     spectra: Mapping[EquationKey, Spectrum]
-    gusts: Mapping[EquationKey, Spectrum]
     slopes: Mapping[EquationKey, Spectrum]
 
 
@@ -156,16 +147,12 @@ def equation_blocks(
         one at every frequency.
     """
     found = []
-    after = unknowns.coefficients
-    errors = np.arange(unknowns.first_error, unknowns.count)
+    errors = np.arange(unknowns.coefficients, unknowns.count)
     for number, window in enumerate(windows):
         for name in window.equations:
             key = name, number
             weight = equation_weight(window.frequency_hz, noise.get(name))
             indices = [unknowns.positions[name]]
-            if key in measured.gusts:
-                before, after = after, after + measured.gusts[key].shape[1]
-                indices.append(np.arange(before, after))
             if measured.slopes:
                 indices.append(errors)
             A, Z = (_real(_columns(side, key) * weight[:, None]) for side in (measured, noise_free))
@@ -187,10 +174,8 @@ def equation_blocks(
 
 
 def _columns(side: EquationSpectra, key: EquationKey) -> Spectrum:
-    """Return the regressors of one block, (F, k): terms, slow gusts, sensor errors."""
+    """Return the regressors of one block, (F, k): terms, sensor errors."""
     parts = [side.spectra[key][:, 1:]]
-    if key in side.gusts:
-        parts.append(side.gusts[key])
     if side.slopes:
         parts.append(-side.slopes[key])
     return np.hstack(parts)

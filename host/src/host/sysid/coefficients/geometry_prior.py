@@ -35,7 +35,7 @@ def apply_geometry_prior(
     Parameters
     ----------
     state : Array, shape (n,)
-        Estimate of the fit: coefficients, slow gusts, sensor errors.
+        Estimate of the fit: coefficients, sensor errors.
     covariance : Array, shape (n, n)
     at_trim : dict
         From `derivatives_at_trim`, nuisance terms too. A relation whose derivatives are absent is
