@@ -32,8 +32,9 @@ from host.aircraft.airframe import (
     R,
 )
 from host.aircraft.attitude import euler
-from host.aircraft.rigid_body import derivative, step
+from host.aircraft.rigid_body import derivative, gust_in_body, step
 from host.compiled import compiled_fast
+from host.sysid.aerodynamics.varying_airspeed import VaryingModel
 from host.sysid.models import Maneuver, Trim
 from host.twin.flight import pilot
 
@@ -49,7 +50,6 @@ from studies.gusts import (
     gusty_aircraft,
     program,
 )
-from studies.turning_gusts import TurningModel
 
 BEFORE_S = 60.0  # of gusts, before the aircraft meets them
 TRUTH_EVERY = 10  # samples between two looks at the local derivatives
@@ -76,7 +76,7 @@ def _steady() -> tuple[Airframe, trim.Trim]:
 
 
 @cache
-def varying(axis: str, airspeed_mps: float | None = None) -> TurningModel:
+def varying(axis: str, airspeed_mps: float | None = None) -> VaryingModel:
     """Return the model of one axis with the departures a flight has from it.
 
     Parameters
@@ -92,7 +92,7 @@ def varying(axis: str, airspeed_mps: float | None = None) -> TurningModel:
     plane = gusty_aircraft(airspeed_mps)
     spin = frame.rotor_inertia_kgm2 * float(steady.state[ROTOR])
     theta = float(euler(steady.state[Q0 : Q0 + 4])[1])
-    return TurningModel(
+    return VaryingModel(
         plane.models[axis],
         axis,
         Trim(plane.airspeed_mps, steady.alpha_rad, theta),
@@ -115,11 +115,14 @@ def _advance(
     work: Array,
 ) -> None:
     """Fly one sample, its commands held; `noise` has a row per step."""
+    gust = np.empty(6)
     for k in range(noise.shape[0]):
         u, v, w = x[0] - moving[3], x[1] - moving[4], x[2] - moving[5]
         speed = np.sqrt(u * u + v * v + w * w)
         step(frame, x, command, moving, density_kgpm3, step_s, work)
-        gust_step(gusts, filters, noise[k], speed, frame.span_m, step_s, moving[3:])
+        gust_step(gusts, filters, noise[k], speed, frame.span_m, step_s, gust)
+        moving[3], moving[4], moving[5] = gust_in_body(x, gust)
+        moving[6:] = gust[3:]
 
 
 def _fly(

@@ -150,7 +150,7 @@ def nonlinear_setup(axis: str, airspeed_mps: float) -> GustSetup:
     """
     plane, flown = gusty_aircraft(airspeed_mps), varying(axis, airspeed_mps)
     wide = gust_model(
-        flown.gusty,
+        flown.model,
         plane.airspeed_mps,
         spectrum(axis, 1.0).length_m,
         span_m=plane.airframe.span_m,
