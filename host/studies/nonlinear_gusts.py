@@ -121,7 +121,7 @@ def _advance(
         speed = np.sqrt(u * u + v * v + w * w)
         step(frame, x, command, moving, density_kgpm3, step_s, work)
         gust_step(gusts, filters, noise[k], speed, frame.span_m, step_s, gust)
-        moving[3], moving[4], moving[5] = gust_in_body(x, gust)
+        moving[3], moving[4], moving[5] = gust_in_body(x, gust, moving)
         moving[6:] = gust[3:]
 
 
@@ -135,6 +135,7 @@ def _fly(
     filters, moving, work = np.zeros(air.GUST_STATES), np.zeros(9), np.zeros((5, STATE_COUNT + 4))
     for row in rng.standard_normal((round(BEFORE_S / step_s), 4)):
         gust_step(gusts, filters, row, steady.airspeed_mps, frame.span_m, step_s, moving[3:])
+    moving[3:6] = gust_in_body(steady.state, moving[3:6].copy(), moving)
     noise = rng.standard_normal((samples, FINE, 4))
     test, late = program(axis), round(PILOT_DELAY_S / DT_S)
     bank_gain, pitch_gain = pilot.gains(frame, steady)

@@ -110,8 +110,8 @@ def gust_step(
         Independent standard normal numbers.
     airspeed_mps, span_m, step_s : float
     out : (6,) array
-        Along the track, to its right, down (m/s); about these axes (rad/s). Where w grows towards
-        the nose, the air turns nose-down.
+        Along the path, to its right, down (m/s); about the body's axes (rad/s), for they are of its
+        size. Where w grows towards the nose, the air turns nose-down.
     """
     # Dryden forms of MIL-F-8785C 3.7.2 (EQUATIONS.md, eq. 9): u of first order, v and w of second.
     v = max(airspeed_mps, 1.0)

@@ -177,14 +177,14 @@ def rotate_to_ned(x: Array, a: float, b: float, c: float) -> tuple[float, float,
 
 
 @compiled_fast
-def gust_in_body(x: Array, gust: Array) -> tuple[float, float, float]:
-    """Turn a gust along the track, to its right and down to body axes.
+def gust_in_body(x: Array, gust: Array, wind: Array) -> tuple[float, float, float]:
+    """Turn a gust along the path through the mean air, to its right and down to body axes.
 
-    Turbulence stays with the ground (MIL-F-8785C 3.7.1): an aircraft that yaws or pitches does not
-    take it along.
+    So does MIL-F-8785C near the ground. An aircraft that rolls, pitches or yaws does not take the
+    gust along.
     """
     north, east, _ = rotate_to_ned(x, x[U], x[V], x[W])
-    track = math.atan2(east, north)
+    track = math.atan2(east - wind[1], north - wind[0])
     c, s = math.cos(track), math.sin(track)
     return rotate_to_body(x, c * gust[0] - s * gust[1], s * gust[0] + c * gust[1], gust[2])
 

@@ -70,7 +70,7 @@ def fly_steps(
         speed = math.sqrt(ua * ua + va * va + wa * wa)
         if turbulence.sigma_w_mps > 0.0 and flying:
             gust_step(turbulence, z, noise[i], speed, frame.span_m, step_s, gust)
-            now[3], now[4], now[5] = gust_in_body(x, gust)
+            now[3], now[4], now[5] = gust_in_body(x, gust, wind)
             now[6:] = gust[3:]
 
         row = i // hands.period_steps
