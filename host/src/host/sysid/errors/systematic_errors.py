@@ -25,9 +25,9 @@ from host.sysid.estimators.gust_penetration import penetration_of, without_gust_
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.rate_forces import by_prior, with_rate_forces
-from host.sysid.models.reduced_model import without_outputs
+from host.sysid.models.reduced_model import without_inputs, without_outputs
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.models.templates import TEMPLATES, Trim, template
+from host.sysid.models.templates import TEMPLATES, WITHOUT_AIRSPEED, Trim, template
 from host.sysid.models.uncertainty import Uncertainty, consider_covariance
 from host.sysid.numerics.model_problems import output_problem
 from host.sysid.numerics.output_error_problem import OutputProblem
@@ -321,7 +321,7 @@ def _changed(
 
 def is_template(model: LinearModel, trim: Trim) -> bool:
     """Return whether a model equals the template of its name at a trim."""
-    if model.name not in TEMPLATES:
+    if model.name not in TEMPLATES or not (trim.known or model.name in WITHOUT_AIRSPEED):
         return False
     fresh, model = _about(model, trim), without_gust_penetration(model)
     same = fresh.outputs == model.outputs and fresh.terms == model.terms
@@ -333,6 +333,7 @@ def _about(model: LinearModel, trim: Trim) -> LinearModel:
     forces = any(y.startswith("a") and y.endswith("_mps2") for y in model.outputs)
     fresh = template(model.name, trim, accelerometers=forces)
     fresh = with_rate_forces(fresh) if by_prior(model) else fresh
+    fresh = without_inputs(fresh, [u for u in fresh.inputs if u not in model.inputs])
     return without_outputs(fresh, [y for y in fresh.outputs if y not in model.outputs])
 
 
