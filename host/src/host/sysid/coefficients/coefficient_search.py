@@ -245,15 +245,9 @@ def _linearise(
             )
             iterate.slopes = first, second
     return data, (
-        _spectra(problem, data, iterate.slopes[0]),
-        _spectra(problem, noise_free_data, iterate.slopes[1]),
+        EquationSpectra(data.spectra, iterate.slopes[0]),
+        EquationSpectra(noise_free_data.spectra, iterate.slopes[1]),
     )
-
-
-def _spectra(
-    problem: FlightProblem, data: EquationData, slopes: SensorErrorSlopes
-) -> EquationSpectra:
-    return EquationSpectra(data.spectra, slopes)
 
 
 def _whole_axes(model: CoefficientModel) -> tuple[bool, bool]:

@@ -1,9 +1,9 @@
 """One equation in one window: its regressors over the unknowns that enter it; normal equations.
 
-Forty maneuvers have two hundred blocks and three hundred unknowns; one block contains fifty of
-them: its terms, the sensor errors. The normal equations are sums over blocks, so
-the matrix with a line for every frequency of a flight is never formed. Each block has a constant
-and a slope in time of its own, which are projected out: the same result as estimating them.
+Forty maneuvers have two hundred blocks; each contains the terms of its equation and the sensor
+errors. The normal equations are sums over blocks, so the matrix with a line for every frequency of
+a flight is never formed. Each block has a constant and a slope in time of its own, which are
+projected out: the same result as estimating them.
 """
 
 from __future__ import annotations

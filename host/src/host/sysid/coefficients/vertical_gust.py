@@ -18,7 +18,7 @@ def vertical_gust_mps(rate_spectrum: Array, airspeed_mps: float, dt_s: float) ->
     Parameters
     ----------
     rate_spectrum : Array, shape (F,)
-        Spectrum of the residual of the vertical kinematic equation, which is the gust's rate.
+        Spectrum of the residual of a kinematic equation, which is the gust's rate.
     airspeed_mps, dt_s : float
     """
     squared = np.median(rate_spectrum) * dt_s * LENGTH_M / airspeed_mps / RATE_SPECTRUM
