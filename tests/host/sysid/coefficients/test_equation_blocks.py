@@ -40,7 +40,8 @@ def random_blocks(
     window = Window(0.0, 8.0, longitudinal=True)
     blocks = [
         replace(
-            window_transform(np.arange(260 + k), 0.03, window, ("CL", "CD")), equations=("Cm", "w")
+            window_transform(np.arange(260 + k % 20), 0.03, window, ("CL", "CD")),
+            equations=("Cm", "w"),
         )
         for k in range(windows)
     ]
