@@ -12,7 +12,6 @@ import numpy as np
 from host.aircraft.mode_names import DUTCH_ROLL, PHUGOID, ROLL, SHORT_PERIOD, SPIRAL
 from host.sysid.answer.marks import Judged, mark_of, share_text
 from host.sysid.answer.parameter_words import NOT, word_of
-from host.sysid.errors.systematic_errors import in_level_flight
 
 if TYPE_CHECKING:
     from host.sysid.answer.marks import Verdict
@@ -101,9 +100,7 @@ def _doubts(name: str, reasons: Mapping[str, Sequence[str]]) -> list[str]:
 
 def _participating(answer: Answer, mode: Mode, states: Sequence[str]) -> list[str]:
     """Return the states with a large share in a mode, among those given."""
-    model = in_level_flight(answer.model, answer.trim)
-    A = model.matrices(answer.result.estimate[: len(model.parameters)])[0]
-    values, right = np.linalg.eig(A)
+    values, right = np.linalg.eig(answer.result.matrices()[0])
     left = np.linalg.inv(right)
     k = int(np.argmin(np.abs(values - mode.eigenvalue)))
     part = np.abs(left[k] * right[:, k])
