@@ -154,8 +154,9 @@ def test_one_deviation_of_the_clock_counts_what_a_wrong_clock_does(
     for name in ("Cm_de direct", "Cl_da direct", "Cm_de linear", "Cl_da linear"):
         counted = np.sqrt(there[name][1] ** 2 - settled[name][1] ** 2) / 1.96
         ratios.append(counted / abs(moved[name][0] - settled[name][0]))
-    assert 0.5 < min(ratios) <= max(ratios) < 2.0
-    assert np.mean(ratios) == pytest.approx(1.0, abs=0.3)
+    # Cm_de by the direct fit counts 1.1 to 2.0 times as much as it moves, in three flights.
+    assert 1.0 < ratios[0] < 2.0
+    assert ratios[1:] == pytest.approx([1.0] * 3, rel=0.3)
 
 
 def test_a_line_of_a_pulse_is_the_servos_deviation(tmp_path: Path) -> None:

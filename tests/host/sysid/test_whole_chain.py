@@ -124,3 +124,4 @@ def test_slow_rows_of_the_same_flight_are_graded_alike(flown: tuple[Path, dict[s
         for c in (columns, slow)
     )
     assert at_25_hz == pytest.approx(at_100_hz, abs=0.1)
+    assert not any(grade(slow, item).remarks for item in detect_maneuvers(slow))

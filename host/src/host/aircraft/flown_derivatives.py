@@ -106,10 +106,10 @@ def flown_modes(
     at : FlownCondition
     gravity_mps2 : float
     """
-    d, gravity = derivatives, gravity_mps2
+    d = derivatives
     longitudinal = np.array(
         [
-            [d["D_V"], d["D_alpha"] + gravity, d["D_q"], -gravity],
+            [d["D_V"], d["D_alpha"] + gravity_mps2, d["D_q"], -gravity_mps2],
             [d["Z_V"], d["Z_alpha"], 1.0 + d["Z_q"], 0.0],
             [d["M_V"], d["M_alpha"], d["M_q"], 0.0],
             [0.0, 0.0, 1.0, 0.0],
@@ -121,7 +121,7 @@ def flown_modes(
                 d["Y_beta"],
                 d["Y_p"] + math.sin(at.alpha_rad),
                 d["Y_r"] - math.cos(at.alpha_rad),
-                gravity * math.cos(at.alpha_rad) / at.airspeed_mps,
+                gravity_mps2 * math.cos(at.alpha_rad) / at.airspeed_mps,
             ],
             [d["L_beta"], d["L_p"], d["L_r"], 0.0],
             [d["N_beta"], d["N_p"], d["N_r"], 0.0],

@@ -180,8 +180,8 @@ def rotate_to_ned(x: Array, a: float, b: float, c: float) -> tuple[float, float,
 def gust_in_body(x: Array, gust: Array, wind: Array) -> tuple[float, float, float]:
     """Turn a gust along the path through the mean air, to its right and down to body axes.
 
-    So does MIL-F-8785C near the ground. An aircraft that rolls, pitches or yaws does not take the
-    gust along.
+    The field is frozen (Etkin, Dynamics of Atmospheric Flight, ch. 13): an aircraft that rolls,
+    pitches or yaws in it does not turn it.
     """
     north, east, _ = rotate_to_ned(x, x[U], x[V], x[W])
     track = math.atan2(east - wind[1], north - wind[0])

@@ -43,7 +43,7 @@ from host.sysid.flight.reconstructed_flight import (
     ReconstructedFlight,
     maneuver_name,
 )
-from host.sysid.maneuvers.maneuver_detection import FLYING_SHARE, TRIM_AFTER_GAP_S, DetectedManeuver
+from host.sysid.maneuvers.maneuver_detection import FLYING_SHARE, REACH_BACK_S, DetectedManeuver
 from host.sysid.models.coefficient_model import BODY, WIND, CoefficientModel, standard_model
 from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.uncertainty import dominant_error_source
@@ -244,8 +244,8 @@ class CoefficientEstimator:
 
 def _fits_in(found: DetectedManeuver, t: Array) -> bool:
     """Return whether a maneuver of a surface, its trim before it, lies in a record's time."""
-    first_s = found.start_s - (0.0 if found.given else TRIM_AFTER_GAP_S)
-    long_enough = found.end_s - found.start_s + TRIM_AFTER_GAP_S >= SHORTEST_S
+    first_s = found.start_s - (0.0 if found.given else REACH_BACK_S)
+    long_enough = found.end_s - found.start_s + REACH_BACK_S >= SHORTEST_S
     inside = t[0] <= first_s and found.end_s <= t[-1]
     return found.axis != "throttle" and long_enough and bool(inside)
 
@@ -271,7 +271,7 @@ def merged_windows(found: Sequence[DetectedManeuver]) -> list[Window]:
     windows: list[Window] = []
     for item in sorted(found, key=lambda f: (f.axis != "elevator_rad", f.start_s)):
         along = item.axis == "elevator_rad"
-        first, last = item.start_s - TRIM_AFTER_GAP_S, item.end_s
+        first, last = item.start_s - REACH_BACK_S, item.end_s
         if windows and not along and not windows[-1].longitudinal:
             before = windows[-1]
             if first < before.last_s - SHORTEST_S:

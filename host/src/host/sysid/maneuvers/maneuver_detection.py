@@ -32,7 +32,7 @@ AWAY = 0.3  # of an input, or of the answer to it: what is further from its rest
 OUT = 0.4  # of an input: the surface stands at one side
 PARTING_GAP_S = 5.0
 SHORTEST_PART_S = 1.0  # of a maneuver that a gap divides
-TRIM_AFTER_GAP_S = 0.5  # fits of coefficients reach as far back from the start
+REACH_BACK_S = 0.5  # of a fit of coefficients before the start of a maneuver
 FEWEST = 8  # samples, as a maneuver needs
 STEADY_TREND = 0.6  # rank correlation of swing length with order: a sweep's swings shorten
 RESPONSE_S = 3.0  # the window reaches this long past the last edge
@@ -153,7 +153,7 @@ def _parts(item: DetectedManeuver, t: Array, measured: BoolArray) -> list[Detect
     for samples in runs_of(measured & inside):
         first_s, last_s = float(t[samples[0]]), float(t[samples[-1]])
         if last_s - first_s >= SHORTEST_PART_S:
-            begin_s = item.start_s if first_s <= item.start_s else first_s + TRIM_AFTER_GAP_S
+            begin_s = item.start_s if first_s <= item.start_s else first_s + REACH_BACK_S
             input_end_s = float(np.clip(item.input_end_s, begin_s, last_s))
             parts.append(replace(item, start_s=begin_s, input_end_s=input_end_s, end_s=last_s))
     return parts

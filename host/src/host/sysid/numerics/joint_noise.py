@@ -22,8 +22,8 @@ from host.sysid.numerics.input_drive import OutputData
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.simulator import Response
 
-# Parameters in the noise, then noise without what they took. After 30 a dutch roll's deviation is
-# larger, by 1.3 times, but the order changes on the way, and rounding decides where it ends.
+# Rounds of expectation and maximisation. Thirty make a dutch roll's deviation 1.3 times as large,
+# but the order of least BIC changes between them, and rounding decides which is the last.
 ROUNDS = 5
 
 

@@ -65,6 +65,7 @@ def excess_over_noise_model(
         slopes = slopes_of_means(problem, number, response)[:, :, problem.n_common :]
         errors_drawn = random_errors(rng, wide, free.theta, result, maneuver, block)
         for j, errors in enumerate(errors_drawn):
+            # Products of each draw with itself add up, whichever stands for the residual.
             moments[j] += lagged_moments([errors[:, 0]], [errors[:, 1:]], HIGHEST_ORDER)
         weight = 1.0 / np.maximum(np.mean(errors_drawn**2, axis=(1, 2)), 1e-300)
         errors_drawn -= slopes @ weighted_fit(errors_drawn, slopes, weight)
